@@ -106,7 +106,7 @@ def cards(entries: Iterable[Mapping[str, str]], statistics: Mapping[str, Any]) -
             column = SUMMARY[name]
             total = f"of {statistics[entry['of']]} " if entry.get("of") in statistics else ""
             ends = _interval(statistics, column)
-            interval_95 = f" (95 %: {ends})" if ends else _withheld(statistics) if name in _WITH_INTERVAL else ""
+            interval_95 = f" (95 %: {ends})" if ends else _withheld(statistics, name) if name in _WITH_INTERVAL else ""
             named = f" {predictor_label(statistics[entry['name']])}" if entry.get("name") else ""
             part = fewer_frames(statistics) if name == "skill_strongest" else ""
             fewer = f" {part}" * bool(part)
@@ -123,10 +123,13 @@ def _used_for_roll(statistics: Mapping[str, Any]) -> str:
     return "" if fitted in (NOTHING, "0") else f" ({fitted} more used for the roll)"
 
 
-def _withheld(statistics: Mapping[str, Any]) -> str:
-    """`` (no interval: 1 insertion)`` where the note on intervals says so; empty where it says something else."""
-    why, told, rest = str(statistics.get("interval")).partition("interval withheld: ")
-    return f" (no interval: {rest.partition(',')[0]})" if told and not why else ""
+def _withheld(statistics: Mapping[str, Any], name: str) -> str:
+    """`` (no interval: 1 insertion)`` where the note on intervals says so of all or of this one; empty where not."""
+    for part in str(statistics.get("interval")).split("; "):
+        whose, told, rest = part.partition("interval withheld: ")
+        if told and whose in ("", f"{name} "):
+            return f" (no interval: {rest.partition(',')[0]})"
+    return ""
 
 
 def predictor_label(name: str) -> str:

@@ -1,6 +1,6 @@
 """The pages: one per case, one for the run. Built from files on disk, so they can be rebuilt at any time."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -106,6 +106,7 @@ def _drawn(case: CaseFiles, embed: bool, each: Each) -> dict[str, Any]:
 def render_index(out_dir: Path, embed: bool = False, each: Each = one_by_one) -> Path:
     """Draw the figures of the run and write index.html; returns its path. Arguments as for ``render_case``."""
     cases, failures = readable_cases(out_dir)
+    damaged = {row["case"] for row in failures}
     files = run_files(out_dir, cases)
     summary, errors, whole = files.summary, files.errors, read_if_there(out_dir / OVERALL_FILE, SUMMARY)
     pages = {case.name: case.folder / "report.html" for case in cases}
@@ -114,15 +115,15 @@ def render_index(out_dir: Path, embed: bool = False, each: Each = one_by_one) ->
     runs = {path.name: read_json(path) for path in sorted(out_dir.glob("run*.json"))}
     infos = list(runs.values())
     row = dict(whole.iloc[0]) if len(whole) else {}
-    calibration = set(summary["case"][summary["role"] == "calibration"])
+    uncounted = damaged | set(summary["case"][summary["role"] == "calibration"])
     missing = not_run(out_dir)
     mixed, cases_said = mixed_settings(out_dir), zip(summary["role"], summary["status"], strict=True)
     why_none = mixed or unscored(cases_said) or not_reached(out_dir)
     page = {
-        **_headline(cases, _status(out_dir, failures, mixed), row, missing),
+        **_headline(cases, _status(out_dir, failures, mixed), row, missing, damaged),
         **_worse_cases(summary, links),
         "verdict": verdict(row, _simulator(cases)) or why_none,
-        "worst": worst_frames({n: t for n, t in errors.items() if n not in calibration}, links),
+        "worst": worst_frames({n: t for n, t in errors.items() if n not in uncounted}, links),
         # of several shards' commands none is the one of the run
         "next": next_command([*(f["case"] for f in failures), *missing], typed(out_dir) if len(infos) == 1 else ()),
         "failures": alike(failures),
@@ -257,12 +258,16 @@ def _simulator(cases: list[CaseFiles]) -> str:
     return next((case.simulator for case in cases if case.simulator), "")
 
 
-def _headline(cases: list[CaseFiles], status: str, row: Mapping[str, Any], missing: Sequence[str]) -> dict[str, Any]:
+def _headline(
+    cases: list[CaseFiles], status: str, row: Mapping[str, Any], missing: Sequence[str], damaged: Container[str]
+) -> dict[str, Any]:
     """Cases and frames as the last line on the terminal counts them: a case that crashed had frames, too.
 
-    status : ok, or what the badge says instead.     missing : cases without a result here.
+    status : ok, or what the badge says instead.     missing : cases without a result here.     damaged : those of which
+    no frame counts.
     """
-    n_good = sum(case.statistics.get("frames_ok", len(case.good)) for case in cases)
+    whole = [case for case in cases if case.name not in damaged]
+    n_good = sum(case.statistics.get("frames_ok", len(case.good)) for case in whole)
     n_frames = sum(case.statistics.get("frames") or len(case.errors) for case in cases)
     absent = set(missing) - {case.name for case in cases}
     of = f"{len(cases)} of " * bool(absent)

@@ -46,7 +46,8 @@ def note(insertions: int) -> str:
 def in_words(low: float, high: float, said: str) -> str:
     """An interval and its note as text; an end that is not bounded is left out."""
     bounded = np.isfinite(low), np.isfinite(high)
-    middle, below, above = f"{low:.3f} to {high:.3f}", f"up to {high:.3f}", f"{low:.3f} and more"
+    least, most = (f"{end:.3f}" if abs(end) >= 0.0005 or end == 0 else f"{end:.1g}" for end in (low, high))
+    middle, below, above = f"{least} to {most}", f"up to {most}", f"{least} and more"
     ends = {(True, True): middle, (False, True): below, (True, False): above}.get(bounded)
     return f"95 %: {ends}, {said}" if ends else said
 
@@ -63,11 +64,12 @@ def holding(value: float, low: float, high: float) -> Interval:
     return Interval(min(low, value), max(high, value))
 
 
-def of_log_ratio(over: Array, under: Array, points: Array) -> Interval:
+def of_log_ratio(over: Array, under: Array, points: Array, *, rest: Array | None = None) -> Interval:
     """Interval of log(sum of ``over`` / sum of ``under``), each (insertions,), as is ``points``, their point counts.
 
     With the points themselves as ``under`` it is that of the log mean square. Cox's takes both per point, so that
-    different lengths of insertions do not widen it.
+    different lengths of insertions do not widen it.     rest : (2, insertions), both sums without each insertion, where
+    they are not those of the others, as it has a part in these, too.
     """
     count = len(points)
     if count < FEWEST:
@@ -76,8 +78,9 @@ def of_log_ratio(over: Array, under: Array, points: Array) -> Interval:
     plain, (over, under) = _log_of_totals(over, under), (np.maximum(sums, least) for sums in (over, under))
     whole = float(np.log(over.sum() / under.sum()))
     # one insertion may be so far off that the others are lost in the rounding of the sum
-    rest, under_rest = (np.maximum(sums.sum() - sums, least.sum() - least) for sums in (over, under))
-    left_out = np.log(rest / under_rest)
+    sums = np.array([over, under])
+    rest = np.maximum(sums.sum(axis=1, keepdims=True) - sums if rest is None else rest, least.sum() - least)
+    left_out = np.log(rest[0] / rest[1])
     jackknife = np.sqrt((count - 1) / count * np.sum((left_out - left_out.mean()) ** 2))
     a, b = np.log(over / points), np.log(under / points)
     (aa, ab), (_, bb) = np.cov(a, b)

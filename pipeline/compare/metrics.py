@@ -6,6 +6,7 @@ and how a case pools it. ``register`` adds one, with its column.
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -144,9 +145,14 @@ def rms(values: ArrayLike) -> float:
     return float(np.sqrt(np.mean(array**2))) if array.size else float("nan")
 
 
-def distal(pair: Pair, length_mm: float) -> float:
-    """Root mean square of the point errors of the wire's last ``length_mm``, as far as they count; mm."""
-    return rms(pair.error_mm[pair.arc_mm >= pair.arc_mm[-1] - length_mm - 1e-9])
+def distal(error_mm: Array, arc_mm: Array, length_mm: float) -> Array:
+    """Of point errors (n,) at arc lengths (n,), as far as they count, those of the wire's last ``length_mm``."""
+    return np.asarray(error_mm[arc_mm >= arc_mm[-1] - length_mm - 1e-9])
+
+
+def distal_rms(pair: Pair, length_mm: float) -> float:
+    """Root mean square of these, mm."""
+    return rms(distal(pair.error_mm, pair.arc_mm, length_mm))
 
 
 def same_branch(pair: Pair) -> bool:
@@ -199,10 +205,11 @@ OF_POINTS: dict[str, Callable[[Array], float]] = {
     "max_mm": lambda errors: float(errors.max()),
 }
 """Statistics of point errors: of one frame's points, and pooled over all points of a case alike."""
+DISTAL_MM = {"distal10_rms_mm": 10.0, "distal20_rms_mm": 20.0}
+"""Root mean square of the point errors of the wire's last millimetres, of one frame and pooled alike."""
 METRICS: dict[str, Metric] = {
     **{name: lambda pair, of=of: of(pair.error_mm) for name, of in OF_POINTS.items()},  # type: ignore[misc]
-    "distal10_rms_mm": lambda pair: distal(pair, 10.0),
-    "distal20_rms_mm": lambda pair: distal(pair, 20.0),
+    **{name: partial(distal_rms, length_mm=mm) for name, mm in DISTAL_MM.items()},
     "back_rms_mm": lambda pair: rms(pair.back_mm),
     "hausdorff_mm": lambda pair: float(max(pair.error_mm.max(), pair.back_mm.max())),
     "arc_rms_mm": lambda pair: rms(pair.by_arc_mm),

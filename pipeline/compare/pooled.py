@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.compare import intervals
-from pipeline.compare.metrics import OF_POINTS, rms
+from pipeline.compare.metrics import DISTAL_MM, OF_POINTS, distal, rms
 from pipeline.compare.nulls import ANOTHER, rivals
 from pipeline.model import Array
 from pipeline.status import FrameStatus
@@ -18,11 +18,17 @@ Row = Mapping[str, Any]
 
 
 class Scored(NamedTuple):
-    """A frame that counts: its row, its point errors (n,) in mm, and the insertion that it belongs to."""
+    """A frame that counts: its row, its point errors (n,) in mm and the insertion that it belongs to.
+
+    arc_mm : (n,) where the points lie along the wire, from the entry.     guesses : where the predictor ``another`` has
+    a guess, by insertion that it is made of the sum of squares in mm^2 and the number of points.
+    """
 
     row: Row
     error_mm: Array
+    arc_mm: Array
     insertion: str
+    guesses: Mapping[str, tuple[float, int]] = {}
 
 
 def is_pooled(row: Row, error_mm: Array | None) -> bool:
@@ -49,6 +55,9 @@ def pooled(frames: Sequence[Scored]) -> dict[str, Any]:
     for column in ERRORS:
         if column.name in OF_POINTS:
             result[column.pooled_name] = OF_POINTS[column.name](everything)
+        elif column.name in DISTAL_MM:
+            ends = [distal(frame.error_mm, frame.arc_mm, DISTAL_MM[column.name]) for frame in frames]
+            result[column.pooled_name] = rms(np.concatenate(ends))
         elif column.pooled in POOLING:
             values = numbers(frames, column.name)
             result[column.pooled_name] = _over_frames(POOLING[column.pooled], values, points)
@@ -132,27 +141,54 @@ def _with_intervals(frames: Sequence[Scored], points: Array, values: Row) -> dic
         **skill(frames, squares, nulls),
         **strongest(frames, squares, points),
     }
-    row, told = intervals.fields(found, intervals.note(len(names)))
+    own_note, fewer = intervals.note(len(names)), found.get("strongest_insertions", len(names))
+    said = own_note if fewer == len(names) else f"{own_note}; {SKILL_STRONGEST} {intervals.note(fewer)}"
+    row, told = intervals.fields(found, said)
     return row | {"interval": told}
 
 
-def skill(frames: Sequence[Scored], squares: Array, nulls: Array, name: str = "skill") -> dict[str, float]:
+def skill(
+    frames: Sequence[Scored], squares: Array, nulls: Array, name: str = "skill", rival: str = ""
+) -> dict[str, float]:
     """Skill, with its interval, against a predictor's sums of squares (frames,), over the frames that have one.
 
-    name : of the column; those of the ends follow from it.
+    name : of the column; those of the ends follow from it.     rival : the predictor's own.
     """
     known = np.isfinite(nulls)
     if not nulls[known].sum() > 0:
         return {}
     kept = [frame for frame, is_known in zip(frames, known, strict=True) if is_known]
+    squares, nulls = squares[known], nulls[known]
     points = np.array([len(frame.error_mm) for frame in kept], dtype=float)
-    ends = intervals.of_log_ratio(*by_insertion(kept, squares[known], nulls[known], points))
-    value = 1.0 - float(squares[known].sum() / nulls[known].sum())
+    rest = without_each(kept, squares, nulls) if rival == ANOTHER else None
+    ends = intervals.of_log_ratio(*by_insertion(kept, squares, nulls, points), rest=rest)
+    value = 1.0 - float(squares.sum() / nulls.sum())
     # less error is more skill: the ends change places
     low, high = intervals.holding(value, 1.0 - float(np.exp(ends.high)), 1.0 - float(np.exp(ends.low)))
     return {name: value, f"{name}_low": low, f"{name}_high": high}
 
 
+def without_each(frames: Sequence[Scored], squares: Array, nulls: Array) -> Array:
+    """Sums (2, insertions) of squares and of ``another``'s over the frames of all insertions but one, each in turn.
+
+    The one is left out of the guesses that were made of it, too: insertions share each other as predictors, and as if
+    they did not, an interval covers in 70 to 89 % (Arvesen, Ann. Math. Stat. 40, 1969, on U-statistics).
+    """
+    number = {name: n for n, name in enumerate(dict.fromkeys(frame.insertion for frame in frames))}
+    sums = np.array(by_insertion(frames, squares, nulls))
+    rest: Array = sums.sum(axis=1, keepdims=True) - sums
+    for frame, square, null in zip(frames, squares, nulls, strict=True):
+        whole, count = np.sum([*frame.guesses.values()], axis=0) if frame.guesses else (0.0, 0)
+        for name in frame.guesses.keys() & number:
+            its, points = frame.guesses[name]
+            if count > points:
+                rest[1, number[name]] += len(frame.error_mm) * (whole - its) / (count - points) - null
+            else:  # without this insertion the frame has no guess
+                rest[:, number[name]] -= square, null
+    return rest
+
+
+SKILL_STRONGEST = "skill_strongest"
 LEAST_SHARE = 0.5
 """Share of the points for which a predictor must have a guess to take part, and all that take part must have one
 together: the first frame has no previous one, and no path leads to some tips."""
@@ -177,8 +213,12 @@ def strongest(frames: Sequence[Scored], squares: Array, points: Array) -> dict[s
     if not names:
         return result
     best = min(names, key=lambda name: float(nulls[name][common].sum()))
-    found = skill(frames, squares, np.where(common, nulls[best], np.nan), "skill_strongest")
-    return result | ({"strongest_null": best, "strongest_frames": int(common.sum())} | found if found else {})
+    found = skill(frames, squares, np.where(common, nulls[best], np.nan), SKILL_STRONGEST, best)
+    if not found:
+        return result
+    insertions = len({frame.insertion for frame, judged in zip(frames, common, strict=True) if judged})
+    on = {"strongest_null": best, "strongest_frames": int(common.sum()), "strongest_insertions": insertions}
+    return result | on | found
 
 
 def judged(known: Mapping[str, NDArray[np.bool_]], points: Array) -> tuple[list[str], NDArray[np.bool_]]:

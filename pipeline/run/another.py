@@ -3,6 +3,7 @@
 It needs the traces of all cases, so it is computed after them and stands in overall.csv alone.
 """
 
+import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -11,23 +12,24 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.arrays.polyline import at_arc, samples
-from pipeline.compare.metrics import point_to_curve
+from pipeline.compare.config import CompareConfig
+from pipeline.compare.metrics import point_to_curve, scored
 from pipeline.compare.nulls import ANOTHER
 from pipeline.model import Array
+from pipeline.run import ledger
 from pipeline.run.overall import Found
 from reports.frames_file import read_arrays
 
 SAME_ENTRY_MM = 2.0
 """Traces that begin farther apart count their depths from different places and are not compared."""
+NEAREST_MM = 2.0
+"""How far off the nearest depth may be, at the least; else as far as one frame is from the next."""
 STEP_MM = 0.5
 MOST_OTHERS = 24
 """Most traces in a guess, those of the nearest depths: with all of 500 cases in one phantom it would take ten minutes,
 and the root mean square over 24 is known to about a seventh of itself (1 / sqrt(48))."""
-NOTHING: Array = np.zeros(0)
-Trace = tuple[float, Array, float]
-"""The depth in mm, the traced wire (n, 3) and the arc length in mm from which on it counts."""
-Traces = Mapping[int, Trace]
-"""Traces by frame."""
+Traces = Mapping[int, tuple[float, Array]]
+"""By frame, the depth in mm and the traced wire (n, 3)."""
 
 
 def with_another(out: Path, found: Sequence[Found]) -> list[Found]:
@@ -35,51 +37,69 @@ def with_another(out: Path, found: Sequence[Found]) -> list[Found]:
     phantoms = [case.result.phantom for case in found]
     shared = [case for case in found if case.result.phantom and phantoms.count(case.result.phantom) > 1]
     traces = {case.result.case: _traces(out, case) for case in shared}
-    return [_with_another(case, shared, traces) if case in shared else case for case in found]
+    skip_mm = _skip_mm(out, shared[0]) if shared else 0.0
+    return [_with_another(case, shared, traces, skip_mm) if case in shared else case for case in found]
+
+
+def _skip_mm(out: Path, case: Found) -> float:
+    """``compare.skip_mm`` of a run, which is the same for all cases that are pooled."""
+    with (out / "cases" / case.result.case / ledger.RESULT).open(encoding="utf-8") as file:
+        told = json.load(file).get("settings", {}).get("compare", {}).get("skip_mm", {})
+    return float(told.get("value", CompareConfig().skip_mm))
 
 
 def _traces(out: Path, case: Found) -> Traces:
-    path, found = out / "cases" / case.result.case / "frames.h5", {}
-    kept = read_arrays(path, "traced_mm", "arc_mm") if path.exists() else {}
-    for number, frame in case.frames.items():
-        curve, arc = (kept.get(number, {}).get(name, NOTHING) for name in ("traced_mm", "arc_mm"))
-        if len(curve) > 1:
-            found[number] = (float(frame.row["insertion_mm"]), curve, float(arc[0]) if len(arc) else 0.0)
-    return found
+    """The traces of a case that are to be trusted, whatever became of the simulated wire."""
+    path = out / "cases" / case.result.case / "frames.h5"
+    kept = read_arrays(path, "traced_mm") if path.exists() else {}
+    curves = {number: arrays["traced_mm"] for number, arrays in kept.items() if len(arrays.get("traced_mm", ())) > 1}
+    return {number: (depth, curves[number]) for number, depth in case.traced_mm.items() if number in curves}
 
 
-def _with_another(case: Found, shared: Sequence[Found], traces: Mapping[str, Traces]) -> Found:
+def _with_another(case: Found, shared: Sequence[Found], traces: Mapping[str, Traces], skip_mm: float) -> Found:
     """The case, with the RMS distance of other insertions' nearest traces to the frame's own trace in each row."""
-    mine = {frame.insertion for frame in case.frames.values()}
     phantom = [c for c in shared if c.result.phantom == case.result.phantom]
-    kin = [c for c in phantom if mine.isdisjoint(frame.insertion for frame in c.frames.values())]
-    others, frames = Others([list(traces[c.result.case].values()) for c in kin]), dict(case.frames)
-    for number, (depth, curve, start) in traces[case.result.case].items():
-        arc = samples(depth, STEP_MM)
-        near = [at_arc(wire, arc[arc >= start - 1e-9]) for wire in others.nearest(depth, curve)]
+    kin = [(c.insertion, traces[c.result.case]) for c in phantom if c.insertion != case.insertion]
+    others, frames = Others(kin, traces[case.result.case]), dict(case.frames)
+    for number, (depth, curve) in traces[case.result.case].items():
+        near = others.nearest(depth, curve) if number in frames else ()
         if near:
-            mean = np.mean(point_to_curve(np.concatenate(near), curve)[0] ** 2)
-            row = {**frames[number].row, f"null_{ANOTHER}_rms_mm": float(np.sqrt(mean))}
-            frames[number] = frames[number]._replace(row=row)
+            arc, guesses = scored(samples(depth, STEP_MM), skip_mm), dict[str, Array]()
+            for insertion, wire in near:
+                squares = point_to_curve(at_arc(wire, arc), curve)[0] ** 2
+                guesses[insertion] = np.append(guesses.get(insertion, ()), squares)
+            value = float(np.sqrt(np.mean(np.concatenate(list(guesses.values())))))
+            told = {name: (float(squares.sum()), len(squares)) for name, squares in guesses.items()}
+            row = {**frames[number].row, f"null_{ANOTHER}_rms_mm": value}
+            frames[number] = frames[number]._replace(row=row, guesses=told)
     return replace(case, frames=frames)
 
 
 class Others:
-    """The traces of other cases in one flat list, each with the number of its case."""
+    """The traces of other cases in one flat list, each with the number of its case and its insertion.
 
-    def __init__(self, insertions: Sequence[Sequence[Trace]]) -> None:
-        self.traces = [(owner, *trace) for owner, traces in enumerate(insertions) for trace in traces]
-        self.depths_mm = np.array([depth for _, depth, _, _ in self.traces])
+    own : the case's, for how far a frame is from the next.
+    """
 
-    def nearest(self, depth_mm: float, curve: Array) -> list[Array]:
-        """The trace of nearest depth of each other case, unless it begins elsewhere; at most MOST_OTHERS."""
-        near: list[Array] = []
+    def __init__(self, cases: Sequence[tuple[str, Traces]], own: Traces) -> None:
+        self.traces = [(n, name, *trace) for n, (name, traces) in enumerate(cases) for trace in traces.values()]
+        self.depths_mm = np.array([depth for _, _, depth, _ in self.traces])
+        steps = np.abs(np.diff([depth for depth, _ in own.values()]))
+        self.reach_mm = max(NEAREST_MM, float(np.median(steps)) if len(steps) else 0.0)
+
+    def nearest(self, depth_mm: float, curve: Array) -> list[tuple[str, Array]]:
+        """The trace of nearest depth of each other case, with its insertion, unless it begins elsewhere.
+
+        At most MOST_OTHERS.
+        """
+        near: list[tuple[str, Array]] = []
         seen: set[int] = set()
-        for place in np.argsort(np.abs(self.depths_mm - depth_mm), kind="stable"):
-            owner, _, wire, _ = self.traces[place]
-            if owner not in seen and math.dist(wire[0], curve[0]) < SAME_ENTRY_MM:
-                near.append(wire)
-            seen.add(owner)
-            if len(near) == MOST_OTHERS:
+        off_mm = np.abs(self.depths_mm - depth_mm)
+        for place in np.argsort(off_mm, kind="stable"):
+            owner, insertion, _, wire = self.traces[place]
+            if len(near) == MOST_OTHERS or off_mm[place] > self.reach_mm:
                 break
+            if owner not in seen and math.dist(wire[0], curve[0]) < SAME_ENTRY_MM:
+                near.append((insertion, wire))
+            seen.add(owner)
         return near

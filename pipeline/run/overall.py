@@ -4,7 +4,7 @@ Two runs are compared by the ratio of their errors on the frames that count in b
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ from pipeline.compare import intervals
 from pipeline.compare.pooled import Scored, by_insertion, is_pooled, numbers, pooled, skill, squares_of, within
 from pipeline.run import ledger
 from pipeline.run.results import Result, found_results, lost, untold
+from pipeline.status import TRACED
 from reports import tables
 from reports.case_files import find_cases
 from reports.schema import ERRORS, POINTS
@@ -25,10 +26,15 @@ ALL = "(all)"
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """A case found on disk, and its frames that count by their numbers."""
+    """A case found on disk: its frames that count, by their numbers, and the depths of all whose trace is trusted.
+
+    insertion : that it belongs to, as ``insertions_of`` names it.
+    """
 
     result: Result
     frames: Mapping[int, Scored]
+    traced_mm: Mapping[int, float] = field(default_factory=dict)
+    insertion: str = ""
 
 
 def found_cases(out: Path) -> list[Found]:
@@ -63,7 +69,8 @@ def shared_scans(results: Sequence[Result]) -> list[str]:
     for result in results:
         stated.setdefault(insertions[result.case], {})[result.case] = result.group or result.case
     return [
-        f"cases {', '.join(groups)} have scans or curves in common and count as one insertion"
+        f"cases {', '.join(groups)} have scans or curves in common and count as one insertion; what they share is "
+        "pooled as often as it is listed"
         for groups in stated.values()
         if len(set(groups.values())) > 1
     ]
@@ -79,20 +86,24 @@ def _found(out: Path, result: Result, insertion: str) -> Found:
         return Found(result, {})
     folder = out / "cases" / result.case
     try:
-        return Found(result, _scored(folder, insertion))
+        return Found(result, *_scored(folder, insertion), insertion)
     except (OSError, EOFError, ValueError, KeyError) as error:
-        return Found(lost(result.case, "damaged", f"{folder / POINTS.file}: {error}"), {})
+        return Found(lost(result.case, "damaged", f"{folder / POINTS.file}: {error}", result), {})
 
 
-def _scored(folder: Path, insertion: str) -> dict[int, Scored]:
-    if not (folder / POINTS.file).exists():
-        return {}
-    points, errors = tables.read(folder / POINTS.file, POINTS), tables.read(folder / ERRORS.file, ERRORS)
-    frame, distance = points["frame"].to_numpy(dtype=int), points["error_mm"].to_numpy(dtype=float)
+def _scored(folder: Path, insertion: str) -> tuple[dict[int, Scored], dict[int, float]]:
+    """The frames that count, and the depths of those whose trace is trusted."""
+    if not (folder / ERRORS.file).exists():
+        return {}, {}
+    points, errors = tables.read_if_there(folder / POINTS.file, POINTS), tables.read(folder / ERRORS.file, ERRORS)
+    frame, error, arc = (points[name].to_numpy(dtype=float) for name in ("frame", "error_mm", "arc_mm"))
+    own = {number: frame == number for number in errors["frame"]}
     # field by field: pandas takes ten times as long for the few rows of a case
     rows = [{str(k): None if v is pd.NA or v != v else v for k, v in row.items()} for row in errors.to_dict("records")]
-    scored = [Scored(row, distance[frame == row["frame"]], insertion) for row in rows]
-    return {int(one.row["frame"]): one for one in scored if is_pooled(one.row, one.error_mm)}
+    scored = [Scored(row, error[own[row["frame"]]], arc[own[row["frame"]]], insertion) for row in rows]
+    counted = {int(one.row["frame"]): one for one in scored if is_pooled(one.row, one.error_mm)}
+    known = errors[errors["status"].isin(TRACED) & errors["insertion_mm"].notna()]
+    return counted, dict(zip(known["frame"].astype(int), known["insertion_mm"].astype(float), strict=True))
 
 
 def validation(found: Sequence[Found]) -> list[Found]:
@@ -163,15 +174,22 @@ class Ratio:
         return f"{self.sentence}: {meaning}"
 
 
+SAME_DEPTH_MM = 2.0
+"""How far apart two runs may have one frame: a depth may be stated in one and traced in the other, but frames of other
+numbers are other scans."""
+
+
 def pairs(before: Sequence[Found], after: Sequence[Found]) -> list[tuple[Scored, Scored]]:
-    """The frames that count in both runs, of validation cases."""
+    """The frames that count in both runs, of validation cases; a number that has another depth is another frame."""
     old = {case.result.case: case.frames for case in validation(before)}
-    return [
+    both = [
         (old[case.result.case][number], frame)
         for case in validation(after)
         for number, frame in case.frames.items()
         if number in old.get(case.result.case, {})
     ]
+    apart = np.abs(np.subtract(*(numbers([pair[k] for pair in both], "insertion_mm") for k in (0, 1))))
+    return [pair for pair, mm in zip(both, apart, strict=True) if not mm > SAME_DEPTH_MM]
 
 
 def ratio(before: Sequence[Found], after: Sequence[Found]) -> Ratio | None:
@@ -198,7 +216,7 @@ def skill_beside(before: Sequence[Found], after: Sequence[Found], null: str) -> 
     both = pairs(before, after) if null else []
     if not both:
         return {}
-    second = [frame for _, frame in both]
+    second = [frame._replace(guesses=first.guesses) for first, frame in both]
     points = np.array([float(len(frame.error_mm)) for frame in second])
     nulls = points * numbers([frame for frame, _ in both], f"null_{null}_rms_mm") ** 2
-    return skill(second, squares_of(second), nulls, "skill_strongest")
+    return skill(second, squares_of(second), nulls, "skill_strongest", null)

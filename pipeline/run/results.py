@@ -105,20 +105,23 @@ def found_results(out: Path) -> list[Result]:
 def _found(folder: Path) -> Result:
     path, written = folder / ledger.RESULT, ledger.read(folder)
     wrong = written.amiss(folder, ledger.TABLES) if written else ""
-    if wrong:
-        return lost(folder.name, "damaged", f"{folder}: {wrong}; run the case again")
+    altered = f"{folder}: {wrong}; run the case again" * bool(wrong)
     try:
         result = read_result(path)
     except (ValidationError, OSError) as error:
         why = error.errors()[0]["msg"] if isinstance(error, ValidationError) else error
-        return lost(folder.name, "damaged", f"{path}: {why}")
+        return lost(folder.name, "damaged", altered or f"{path}: {why}")
+    if altered:
+        return lost(folder.name, "damaged", altered, result)
     if result.case != folder.name:
         return lost(
             folder.name, "damaged", f"{folder}: holds the result of case {result.case!r}; remove it or rename it so"
         )
     # a case that went through the stages has a key; while a run is still at work on it, its ledger may be missing
     if written is None and result.key and not owner_of(folder):
-        return lost(folder.name, "damaged", f"{folder}: {ledger.FILE} is missing or cannot be read; run the case again")
+        return lost(
+            folder.name, "damaged", f"{folder}: {ledger.FILE} is missing or cannot be read; run the case again", result
+        )
     return result
 
 
@@ -145,12 +148,17 @@ def untold(name: str) -> Result:
     return Result(name, "validation", "", "ok", "", [], [], {"case": name, "frames": 0, "frames_ok": 0, "status": "ok"})
 
 
-def lost(name: str, status: str, reason: str, case: Case | None = None, stage: str = "") -> Result:
-    """The result of a case that could not be finished, or whose result cannot be read (see LOST)."""
+def lost(name: str, status: str, reason: str, case: Case | Result | None = None, stage: str = "") -> Result:
+    """The result of a case that could not be finished, or of whose result a file cannot be read (see LOST).
+
+    case : what is known of it, so that its frames are not missing among those that were planned.
+    """
     sentence = LOST[status]
-    role, group, frames = (case.role, case.group, case.frame_count) if case else ("", "", 0)
+    role, group = (case.role, case.group) if case else ("", "")
+    frames = case.summary["frames"] if isinstance(case, Result) else case.frame_count if case else 0
     summary: dict[str, Any] = {"case": name, "group": group, "role": role, "status": status}
     summary |= {"frames": frames, "frames_ok": 0, "frames_failed": frames}
+    summary |= {"within_1mm": 0.0} if frames else {}
     failure = {"case": name, "status": status, "sentence": sentence, "message": reason}
     failure |= {"log": f"cases/{name}/log.txt"} | ({"stage": stage} if stage else {})
     return Result(name, role, group, status, sentence, [], [failure], summary)

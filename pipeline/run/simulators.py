@@ -17,6 +17,7 @@ from pipeline.run.another import with_another
 from pipeline.run.overall import Found, found_cases, overall, ratio, validation
 from pipeline.run.results import found_results
 from reports import tables
+from reports.case_files import listed
 from reports.html import render_index
 from reports.origin import mixed_settings
 from reports.schema import FAILURES, POINTS, SIMULATORS, WHERE
@@ -42,19 +43,26 @@ def write_comparison(out: Path, folders: Mapping[str, Path]) -> list[str]:
     mixed = mixed_settings(*folders.values())
     pairs = [(one, other) for one in studies for other in studies if one != other and not mixed]
     rows = [_alone(name, found) for name, found in studies.items()]
+    off = {row["simulator"] for row in rows if tips_off(row)}
     sentences = [mixed] * bool(mixed)
     for one, other in pairs:
         both = ratio(studies[other], studies[one])
         if both is not None:
             values = {"rms_ratio": both.value, "rms_ratio_low": both.low, "rms_ratio_high": both.high}
-            row, told = intervals.fields(values, both.note)
+            row, told = intervals.fields(values, "; ".join([both.note, *_caveat(off & {one, other})]))
             rows.append({"simulator": one, "against": other, "common_frames": both.frames, "interval": told, **row})
             if other == OURS:
-                sentences.append(both.sentence.replace("the second run / the first", f"{one} / {OURS}"))
-    off = {row["simulator"] for row in rows if tips_off(row)}
+                said = both.sentence.replace("the second run / the first", f"{one} / {OURS}")
+                sentences.append("; ".join([said, *_caveat(off & {one, other})]))
     tables.write(out / SIMULATORS.file, SIMULATORS, rows)
     tables.write(out / WHERE.file, WHERE, [] if mixed else list(_where(folders, studies, off)))
     return sentences
+
+
+def _caveat(off: Set[str]) -> list[str]:
+    """Why a ratio of errors says nothing: wires that end elsewhere, which these do not show."""
+    told = f"{TIPS_OFF} of {listed(sorted(off))}, which errors from the simulated to the traced wire do not show"
+    return [told] * bool(off)
 
 
 def write_failures(out: Path, folders: Mapping[str, Path]) -> None:

@@ -22,7 +22,7 @@ from pipeline.trace.tube import Tube
 LEAST_CNR = 2.5
 """Contrast over noise below which a frame alone does not give a curve."""
 SURE_LINE = 10.0
-"""The same times the root of the voxels that the curve is long. In 284 frames without a wire lines have 9.6 at most (4.0
+"""The same times the root of the voxels that a curve is long. Of 284 frames without a wire lines have up to 9.6 (4.0
 noises over 5.8 voxels), wires of a contrast of 4 have 8 at 1 mm (3.3 voxels), 10 to 12 at 2 mm; of 5, 10 at 1 mm."""
 LEAST_WITH_PRIOR = 1.5
 """The same with a previous curve, which does not help below that: the frame no longer shows where the wire ends."""

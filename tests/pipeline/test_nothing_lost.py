@@ -111,7 +111,7 @@ def test_no_number_is_pooled_from_a_table_that_was_changed(out: Path, capsys: py
     assert main(["report", str(out)]) == 1
     said = capsys.readouterr()
     assert "errors.csv is not as it was written" in said.err
-    assert "0 ok.  1 of the cases not ok (failures.csv)" in said.out
+    assert "1 case, 2 frames: 0 ok.  2 frames not ok (failures.csv)" in said.out
     assert list(pd.read_csv(out / "summary.csv")["status"]) == ["damaged"]
 
 

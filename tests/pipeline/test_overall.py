@@ -35,7 +35,8 @@ def write_case(out: Path, name: str, errors_mm: list[float], statuses: list[str]
     ]
     tables.write(folder / "errors.csv", ERRORS, rows)
     frame, error = np.repeat(np.arange(len(rows)), 50), np.repeat(errors_mm, 50)
-    tables.write(folder / "points.csv.gz", POINTS, {"frame": frame, "error_mm": error})
+    arc = np.tile(np.arange(50) / 2, len(rows))
+    tables.write(folder / "points.csv.gz", POINTS, {"frame": frame, "arc_mm": arc, "error_mm": error})
     good = statuses.count("ok")
     status = "ok" if good == len(rows) else next(s for s in statuses if s != "ok")
     summary = {"case": name, "group": name, "role": "validation", "status": status, "frames": len(rows)}
@@ -95,6 +96,50 @@ def test_leaving_frames_out_cannot_improve_the_share(study: Path) -> None:
     before = overall(found_cases(study))["within_1mm"]
     write_case(study, "e", [GOOD, BAD, BAD], ["ok", "no_wire", "no_wire"])
     assert overall(found_cases(study))["within_1mm"] < before
+
+
+def test_a_damaged_case_does_not_improve_the_share_either(study: Path) -> None:
+    """Its six frames were missing from the planned ones, and the worst insertion with them."""
+    before = overall(found_cases(study))
+    points = study / "cases" / "b" / "points.csv.gz"
+    points.write_bytes(points.read_bytes()[:-20])
+    aggregate(study, {})
+    whole = pd.read_csv(study / "overall.csv").iloc[0]
+    assert (whole["frames"], whole["frames_ok"]) == (before["frames"], before["frames_ok"] - 1)
+    assert whole["within_1mm"] == pytest.approx(before["within_1mm"] - 1 / before["frames"])
+    row = pd.read_csv(study / "summary.csv").set_index("case").loc["b"]
+    assert (row["status"], row["role"], row["frames"], row["within_1mm"]) == ("damaged", "validation", 2, 0.0)
+
+
+def test_a_skill_over_fewer_insertions_says_so(study: Path) -> None:
+    """``wide: 4 insertions`` stood beside a skill of two of them, which had no interval and did not say why."""
+    for name in ("c", "d"):
+        path = study / "cases" / name / "errors.csv"
+        errors = pd.read_csv(path)
+        tables.write(path, ERRORS, (errors.assign(null_previous_rms_mm=0.5)).to_dict("records"))
+    for name in ("a", "b"):
+        path = study / "cases" / name / "errors.csv"
+        tables.write(path, ERRORS, pd.read_csv(path).assign(null_centreline_rms_mm=np.nan).to_dict("records"))
+    whole = overall(found_cases(study))
+    assert (whole["insertions"], whole["strongest_null"], whole["strongest_insertions"]) == (4, "previous", 2)
+    assert np.isnan(whole["skill_strongest_low"])
+    withheld = "skill_strongest interval withheld: 2 insertions, at least 3 needed"
+    assert whole["interval"] == f"wide: 4 insertions; {withheld}"
+    aggregate(study, {})
+    assert "(no interval: 2 insertions)" in render_index(study).read_text(encoding="utf-8")
+
+
+def test_frames_of_one_number_and_other_depths_are_no_pair(study: Path, tmp_path: Path) -> None:
+    """Of a case that lists its last scan alone that one is frame 0, and was held against the first."""
+    other = tmp_path / "other"
+    write_case(other, "a", [GOOD])
+    path = other / "cases" / "a" / "errors.csv"
+    tables.write(path, ERRORS, pd.read_csv(path).assign(insertion_mm=12.5).to_dict("records"))
+    assert ratio(found_cases(study), found_cases(other)) is None
+    write_case(other, "c", [GOOD])
+    both = ratio(found_cases(study), found_cases(other))
+    assert both is not None
+    assert both.frames == 1
 
 
 def test_two_insertions_have_no_interval(tmp_path: Path) -> None:

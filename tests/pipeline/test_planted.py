@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,8 @@ import pandas as pd
 import pytest
 
 from pipeline.cli import main
+from pipeline.run.another import with_another
+from pipeline.run.overall import found_cases
 
 INSERTIONS, FRAMES = 3, 4
 WRONG = {"simulate.roll_offset_deg": "180", "simulate.rest_curvature_scale": "0"}
@@ -80,6 +83,39 @@ def test_the_row_over_all_rests_on_the_insertions(out: Path) -> None:
     assert whole["strongest_null"] not in ("pinned", "neighbours")
     assert whole[f"null_{whole['strongest_null']}_rms_mm"] <= min(nulls.values()) * 1.001
     assert pd.read_csv(out / "summary.csv")["rms_low_mm"].isna().all(), "a case is one insertion"
+
+
+def test_a_traced_wire_is_a_guess_whatever_became_of_the_simulated_one(out: Path) -> None:
+    """Where the simulator failed in all but the first frame of each insertion, that was the others' nearest trace."""
+    found = found_cases(out)
+    fewer = [replace(case, frames={n: case.frames[n] for n in (0, FRAMES - 1)}) for case in found]
+    none = [*fewer[:-1], replace(fewer[-1], frames={})]
+    whole = {case.result.case: case.frames for case in with_another(out, found)}
+    for cases in (fewer, none):
+        for case in with_another(out, cases):
+            for number, frame in case.frames.items():
+                assert frame.row["null_another_rms_mm"] == whole[case.result.case][number].row["null_another_rms_mm"]
+
+
+def test_a_trace_of_another_depth_is_no_guess(out: Path) -> None:
+    """A wire of 8 mm, straight on to 38, made any simulator look good: one frame a case, nobody has a partner."""
+    found = found_cases(out)
+    apart = [
+        replace(case, frames={n: case.frames[n]}, traced_mm={n: case.traced_mm[n]})
+        for case, n in zip(found, (0, 1, FRAMES - 1), strict=True)
+    ]
+    assert not [f for case in with_another(out, apart) for f in case.frames.values() if f.guesses]
+
+
+def test_what_the_wire_ends_with_is_pooled_over_its_points(out: Path) -> None:
+    """Of a frame it weighed as much as all of its points, of which a short wire has as many as there are."""
+    ends = []
+    for case in found_cases(out):
+        points = pd.read_csv(out / "cases" / case.result.case / "points.csv.gz")
+        for _, own in points[points["frame"].isin(case.frames)].groupby("frame"):
+            ends.append(own.loc[own["arc_mm"] >= own["arc_mm"].max() - 10 - 1e-9, "error_mm"])
+    whole = pd.read_csv(out / "overall.csv").iloc[0]
+    assert whole["distal10_rms_mm"] == pytest.approx(np.sqrt(np.mean(np.concatenate(ends) ** 2)))
 
 
 def test_planted_errors_cost_the_skill(out: Path) -> None:

@@ -18,7 +18,7 @@ from pipeline.status import FrameStatus
 
 def frame(errors: np.ndarray, null: float = 1.0, tip: float = 0.2) -> Scored:
     row = {"status": "ok", "rms_mm": rms(errors), "arc_rms_mm": rms(errors), "tip_mm": tip, "branch_ok": True}
-    return Scored(row | {"null_centreline_rms_mm": null}, errors, "one")
+    return Scored(row | {"null_centreline_rms_mm": null}, errors, np.arange(len(errors)) / 2, "one")
 
 
 def frames(seed: int, count: int = 9) -> list[Scored]:
@@ -45,7 +45,7 @@ def test_the_order_of_frames_does_not_matter_to_the_statistics() -> None:
 
 
 def test_failed_frames_are_not_pooled_and_nothing_gives_nothing() -> None:
-    row, errors, _ = frame(np.full(5, 100.0))
+    row, errors, *_ = frame(np.full(5, 100.0))
     assert is_pooled(row, errors)
     assert not is_pooled({**row, "status": FrameStatus.LENGTH_MISMATCH.identifier}, errors)
     assert not is_pooled({**row, "status": FrameStatus.SIMULATED.identifier}, None)

@@ -92,10 +92,21 @@ def test_a_wire_that_ends_elsewhere_is_not_called_better(along: float | None, sa
     row |= {"skill_strongest": 0.9, "skill_strongest_low": 0.8, "strongest_null": "previous"}
     assert badge("ok", True, row) == {"text": "the tips lie off", "look": "poor"}
     assert f"It {said} (median)" in verdict(row)
-    assert "judge by tip_median_mm, and by back_rms_mm of errors.csv" in verdict(row)
+    assert ("rms_mm does not see that" in verdict(row)) is (along != 1.9), "what lies beyond the trace is seen"
+    assert ("judge by tip_median_mm, and by back_rms_mm of errors.csv" in verdict(row)) is (along != 1.9)
     assert "That is better" not in verdict(row)
     assert badge("ok", True, row | {"tip_median_mm": 0.29})["look"] == "good"
     assert badge("ok", True, row | {"rms_mm": 0.7})["look"] == "good", "a tip is the worst of most wires"
+
+
+def test_wires_that_fold_back_in_a_third_of_the_frames_are_not_called_better() -> None:
+    """Their median tip is right, and what is simulated lies on the trace: half of the trace has no wire near."""
+    row = {"rms_mm": 0.19, "p95_mm": 0.34, "tip_median_mm": 0.3, "coverage": 0.82, "skill_strongest": 0.79}
+    row |= {"skill_strongest_low": 0.7, "strongest_null": "another"}
+    assert badge("ok", True, row) == {"text": "the tips lie off", "look": "poor"}
+    assert "18 % of the traced wires have no simulated one near: rms_mm does not see that" in verdict(row)
+    assert badge("ok", True, row | {"coverage": 0.99})["look"] == "good"
+    assert badge("ok", True, row | {"p95_mm": 3.0})["look"] == "good", "rms_mm sees wires that lie beside the trace"
 
 
 @pytest.mark.parametrize(

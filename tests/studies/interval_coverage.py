@@ -15,9 +15,13 @@ import numpy as np
 from scipy.signal import lfilter
 
 from pipeline.compare.intervals import of_log_ratio, of_medians
+from pipeline.compare.nulls import ANOTHER
+from pipeline.compare.pooled import Scored, skill
 
 SEED = 100
 SPREAD, OUTLIERS, LARGER, NULL, SHARED = 0.8, 0.05, 16.0, 10.0, 0.6
+SIMULATOR = 0.4
+PARTNERS = (3, 4, 6, 20)
 FRAMES, FEWER, MORE = 30, 10, 50
 """Frames of an insertion; where lengths are unequal, from the fewest to the most."""
 
@@ -75,6 +79,29 @@ def coverage(c: Condition, repetitions: int) -> np.ndarray:
     return np.mean([covered(draw, c) for _ in range(repetitions)], axis=0)
 
 
+def covered_by_partners(draw: np.random.Generator, insertions: int) -> bool:
+    """The same of skill where the predictor is the other insertions, which differ by their rolls: all share each other.
+
+    The roll is within 45 degrees, the predictor's error in proportion to the difference of two rolls, the simulator's
+    log-normal.
+    """
+    roll = draw.uniform(-45.0, 45.0, insertions)
+    squares = np.exp(SIMULATOR * draw.normal(size=insertions) - 0.5 * SIMULATOR**2)
+    scored = []
+    for n, mean_square in enumerate(squares):
+        guesses = {str(m): (float((roll[n] - roll[m]) ** 2), 1) for m in range(insertions) if m != n}
+        scored.append(Scored({}, np.array([np.sqrt(mean_square)]), np.zeros(1), str(n), guesses))
+    nulls = np.array([np.mean([square for square, _ in frame.guesses.values()]) for frame in scored])
+    found = skill(scored, squares, nulls, rival=ANOTHER)
+    return bool(found["skill_low"] <= 1.0 - 1.0 / (2.0 * 45.0**2 / 3.0) <= found["skill_high"])
+
+
+def coverage_by_partners(insertions: int, repetitions: int) -> float:
+    """Share of repetitions in which the interval holds the true value."""
+    draw = np.random.default_rng([SEED, insertions])
+    return float(np.mean([covered_by_partners(draw, insertions) for _ in range(repetitions)]))
+
+
 def main(repetitions: int = 4000) -> None:
     """Print a line for each condition, and the extremes."""
     print("lag  insertions  between  unequal  outliers   mean square   skill  median tip")
@@ -89,6 +116,9 @@ def main(repetitions: int = 4000) -> None:
             *np.column_stack([low, high]).ravel()
         )
     )
+    for insertions in PARTNERS:
+        share = coverage_by_partners(insertions, repetitions)
+        print(f"skill against the other insertions, {insertions} of them: {share:.3f}", flush=True)
 
 
 if __name__ == "__main__":

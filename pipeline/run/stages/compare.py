@@ -14,6 +14,7 @@ from pipeline.run.log import Log
 from pipeline.run.stages.budget import budgeted
 from pipeline.run.stages.entries import four_entries, replayed_entries
 from pipeline.run.stages.known import Context, Frame, Known
+from pipeline.run.stages.own_curves import rough
 from pipeline.run.stages.rivals import rival_ways, rival_wires, simulated_rivals
 from pipeline.run.stages.views import compare_in_views
 from pipeline.status import FrameStatus
@@ -33,7 +34,7 @@ def compare_frames(run: Context, known: Known) -> Known:
         clues.known_ways()
     frames, entries = _all_compared(run, known, clues, simulated, entered)
     known = replace(known, frames=frames, entries=entries)
-    run.log.warnings += [*_too_near(known.frames), *_truth_elsewhere(known.frames)]
+    run.log.warnings += [*_too_near(known.frames), *_truth_elsewhere(known.frames), *_rough_truth(known)]
     return budgeted(run, known)
 
 
@@ -109,13 +110,23 @@ TRUTH_MM = 2.0
 
 def _truth_elsewhere(frames: Sequence[Frame]) -> list[str]:
     """A warning where the true wires of a synthetic study lie elsewhere than the traced ones."""
-    off = [f.truth["trace_mean_mm"] for f in frames if f.trusted_curve is not None and "trace_mean_mm" in f.truth]
-    if not off or not np.median(off) > TRUTH_MM:
+    known = [f.truth for f in frames if f.trusted_curve is not None and "trace_mean_mm" in f.truth]
+    off, tips = (np.median([one[name] for one in known] or 0.0) for name in ("trace_mean_mm", "trace_tip_mm"))
+    if not max(off, tips) > TRUTH_MM:
         return []
+    where = f"lie {off:.1f} mm" if off > TRUTH_MM else f"end {tips:.1f} mm"
     return [
-        f"the true wires lie {np.median(off):.1f} mm from the traced ones (median of the frames' means): is truth in "
-        "mm, in LPS, and of these frames? the columns of the truth say nothing before that"
+        f"the true wires {where} from the traced ones (median of the frames): is truth in mm, in LPS, and of these "
+        "frames? the columns of the truth say nothing before that"
     ]
+
+
+def _rough_truth(known: Known) -> list[str]:
+    """A warning of true wires whose points are so far apart that they cut corners."""
+    if known.lumen is None:
+        return []
+    wires = {f.index: f.truth_mm for f in known.frames if f.truth_mm is not None}
+    return rough(wires, float(min(known.lumen.distance.spacing_mm)), "the true wires", "give a point every millimetre")
 
 
 def _too_near(frames: Sequence[Frame]) -> list[str]:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.compare.metrics import Pair, Way, distal, pair_of, rms
+from pipeline.compare.metrics import DISTAL_MM, Pair, Way, distal, pair_of, rms
 from pipeline.model import Clamp
 from pipeline.run.stages.given import manifest_clamp
 from pipeline.run.stages.known import Context, Frame, Known
@@ -75,13 +75,12 @@ def _pair(run: Context, known: Known, frame: Frame, wire: Solution, way: Way) ->
 
 
 def _row(clamp: str, depth: str, pairs: Sequence[Pair]) -> dict[str, Any]:
-    counts = np.array([len(pair.error_mm) for pair in pairs])
-    ends = np.array([distal(pair, 10.0) for pair in pairs])
+    ends = [distal(pair.error_mm, pair.arc_mm, DISTAL_MM["distal10_rms_mm"]) for pair in pairs]
     return {
         "clamp": clamp,
         "depth": depth,
         "frames": len(pairs),
         "rms_mm": rms(np.concatenate([pair.error_mm for pair in pairs])),
-        "distal10_rms_mm": float(np.sqrt(np.sum(counts * ends**2) / counts.sum())),
+        "distal10_rms_mm": rms(np.concatenate(ends)),
         "tip_median_mm": float(np.median([np.linalg.norm(pair.wire_mm[-1] - pair.curve_mm[-1]) for pair in pairs])),
     }
