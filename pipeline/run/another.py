@@ -44,7 +44,7 @@ def with_another(out: Path, found: Sequence[Found]) -> list[Found]:
 def _skip_mm(out: Path, case: Found) -> float:
     """``compare.skip_mm`` of a run, which is the same for all cases that are pooled."""
     with (out / "cases" / case.result.case / ledger.RESULT).open(encoding="utf-8") as file:
-        told = json.load(file).get("settings", {}).get("compare", {}).get("skip_mm", {})
+        told = json.load(file).get("config", {}).get("compare", {}).get("skip_mm", {})
     return float(told.get("value", CompareConfig().skip_mm))
 
 

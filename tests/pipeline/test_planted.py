@@ -7,6 +7,7 @@ centreline they kept 0.74 to 0.82 in the circle of Willis.
 from __future__ import annotations
 
 import json
+import shutil
 import tomllib
 from dataclasses import replace
 from pathlib import Path
@@ -95,6 +96,22 @@ def test_a_traced_wire_is_a_guess_whatever_became_of_the_simulated_one(out: Path
         for case in with_another(out, cases):
             for number, frame in case.frames.items():
                 assert frame.row["null_another_rms_mm"] == whole[case.result.case][number].row["null_another_rms_mm"]
+
+
+def test_another_insertion_counts_from_where_the_simulated_wire_does(out: Path, tmp_path: Path) -> None:
+    """From ``compare.skip_mm`` on, of which the run's own value was not found under a wrong name."""
+    found = found_cases(out)
+    usual = {case.result.case: case.frames for case in with_another(out, found)}
+    shutil.copytree(out, tmp_path / "whole")
+    for path in (tmp_path / "whole").glob("cases/*/result.json"):
+        result = json.loads(path.read_text(encoding="utf-8"))
+        assert result["config"]["compare"]["skip_mm"]["value"] == 10.0
+        result["config"]["compare"]["skip_mm"]["value"] = 0.0
+        path.write_text(json.dumps(result), encoding="utf-8")
+    for case in with_another(tmp_path / "whole", found):
+        for number, frame in case.frames.items():
+            points = [sum(n for _, n in f.guesses.values()) for f in (frame, usual[case.result.case][number])]
+            assert points[0] > points[1]
 
 
 def test_a_trace_of_another_depth_is_no_guess(out: Path) -> None:
