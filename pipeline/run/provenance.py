@@ -54,8 +54,9 @@ def code_state() -> dict[str, Any]:
 
 
 def command_line() -> list[str]:
-    """The command of this run, as it was typed."""
-    return [Path(sys.argv[0]).name, *sys.argv[1:]]
+    """The command of this run, as it was typed; ``python -m pipeline`` is ``wireval``."""
+    program = Path(sys.argv[0]).name
+    return ["wireval" if program == "__main__.py" else program, *sys.argv[1:]]
 
 
 def this_run() -> dict[str, Any]:
