@@ -3,7 +3,6 @@
 It needs the traces of all cases, so it is computed after them and stands in overall.csv alone.
 """
 
-import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -18,6 +17,7 @@ from pipeline.compare.nulls import ANOTHER
 from pipeline.model import Array
 from pipeline.run import ledger
 from pipeline.run.overall import Found
+from reports.case_files import read_json
 from reports.frames_file import read_arrays
 
 SAME_ENTRY_MM = 2.0
@@ -43,9 +43,8 @@ def with_another(out: Path, found: Sequence[Found]) -> list[Found]:
 
 def _skip_mm(out: Path, case: Found) -> float:
     """``compare.skip_mm`` of a run, which is the same for all cases that are pooled."""
-    with (out / "cases" / case.result.case / ledger.RESULT).open(encoding="utf-8") as file:
-        told = json.load(file).get("config", {}).get("compare", {}).get("skip_mm", {})
-    return float(told.get("value", CompareConfig().skip_mm))
+    config = read_json(out / "cases" / case.result.case / ledger.RESULT).get("config", {})
+    return float(config.get("compare", {}).get("skip_mm", {}).get("value", CompareConfig().skip_mm))
 
 
 def _traces(out: Path, case: Found) -> Traces:
@@ -64,14 +63,14 @@ def _with_another(case: Found, shared: Sequence[Found], traces: Mapping[str, Tra
     for number, (depth, curve) in traces[case.result.case].items():
         near = others.nearest(depth, curve) if number in frames else ()
         if near:
-            arc, guesses = scored(samples(depth, STEP_MM), skip_mm), dict[str, Array]()
+            arc, guesses = scored(samples(depth, STEP_MM), skip_mm), dict[str, tuple[float, int]]()
             for insertion, wire in near:
-                squares = point_to_curve(at_arc(wire, arc), curve)[0] ** 2
-                guesses[insertion] = np.append(guesses.get(insertion, ()), squares)
-            value = float(np.sqrt(np.mean(np.concatenate(list(guesses.values())))))
-            told = {name: (float(squares.sum()), len(squares)) for name, squares in guesses.items()}
-            row = {**frames[number].row, f"null_{ANOTHER}_rms_mm": value}
-            frames[number] = frames[number]._replace(row=row, guesses=told)
+                off = point_to_curve(at_arc(wire, arc), curve)[0]
+                squares, count = guesses.get(insertion, (0.0, 0))
+                guesses[insertion] = squares + float(np.sum(off**2)), count + len(off)
+            squares, count = np.sum([*guesses.values()], axis=0)
+            row = {**frames[number].row, f"null_{ANOTHER}_rms_mm": float(np.sqrt(squares / count))}
+            frames[number] = frames[number]._replace(row=row, guesses=guesses)
     return replace(case, frames=frames)
 
 
