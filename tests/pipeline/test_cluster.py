@@ -34,6 +34,11 @@ if __name__ == "__main__":
 """
 
 
+@pytest.fixture(autouse=True)
+def unseen_figures() -> None:
+    """Figures are drawn in full here: the workers of a scheduler do, and theirs are compared."""
+
+
 @pytest.fixture(scope="module")
 def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     """Of the scheduler; the cluster runs in another folder than the test, as one on other machines does."""
