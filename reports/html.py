@@ -8,7 +8,7 @@ from urllib.parse import quote
 import pandas as pd
 
 from reports import _content
-from reports._content import flatten, settings, size
+from reports._content import flatten, settings
 from reports.alike import alike
 from reports.case_files import (
     GOOD,
@@ -27,9 +27,10 @@ from reports.case_files import (
 )
 from reports.counts import scans
 from reports.figures import RunFiles, declared
+from reports.listing import listed_files, listed_view
 from reports.origin import mixed_settings
 from reports.page import Each, begun_first, draw_sections, longest, one_by_one, section, write_page
-from reports.schema import ERRORS, FAILURES, OVERALL_FILE, SIMULATORS, SUMMARY, SWEEP, TIMINGS
+from reports.schema import ERRORS, FAILURES, OVERALL_FILE, SIMULATORS, SUMMARY, SWEEP
 from reports.sweep import silent_points
 from reports.tables import read_if_there
 from reports.verdict import (
@@ -46,10 +47,6 @@ from reports.verdict import (
 from reports.viewer import viewer_data
 
 PHYSICS = ("wire", "catheter", "down", "wall", "entry", "chosen", "geometry")
-_LISTED_FILES = ("result.json", "errors.csv", "points.csv.gz", "frames.h5")
-_OF_THE_RUN = (TIMINGS.file, "provenance.json", "log.txt")
-"""When and where a case was computed, and how long it took: a page of what is ok says nothing of it, so that the same
-results give the same; one with failures repeats the command."""
 
 
 def render_case(case_dir: Path, embed: bool = False, each: Each = one_by_one) -> Path:
@@ -83,8 +80,8 @@ def render_case(case_dir: Path, embed: bool = False, each: Each = one_by_one) ->
         "physics": list(flatten({key: result.get(key, {}) for key in PHYSICS})),
         "config": settings(result.get("config", {})),
         "provenance": list(flatten(result.get("provenance", {}))),
-        "files": _files(case_dir),
-        "view": _view(case_dir),
+        "files": listed_files(case_dir),
+        "view": listed_view(case_dir),
         "version": _version([result]),
     }
     return write_page("case.html.j2", page, case_dir / "report.html")
@@ -280,23 +277,6 @@ def _headline(
     name = _simulator(cases)
     title = " - ".join(filter(None, (name, "wireval")))
     return {"sentence": sentence, "badge": look, "simulator": name, "title": title}
-
-
-def _files(case_dir: Path) -> list[dict[str, str]]:
-    paths = [case_dir / name for name in _LISTED_FILES]
-    listed = [_file(case_dir, path) for path in paths if path.exists()]
-    return listed + [{"name": n, "link": n, "size": ""} for n in _OF_THE_RUN if (case_dir / n).exists()]
-
-
-def _file(case_dir: Path, path: Path) -> dict[str, str]:
-    name = path.relative_to(case_dir).as_posix()
-    return {"name": name, "link": quote(name), "size": size(path.stat().st_size)}
-
-
-def _view(case_dir: Path) -> dict[str, Any]:
-    """The files of ``view/``, some seven a frame, and what they hold together."""
-    paths = sorted(p for p in (case_dir / "view").glob("*") if not p.name.startswith("."))
-    return {"files": [_file(case_dir, p) for p in paths], "size": size(sum(p.stat().st_size for p in paths))}
 
 
 def _version(infos: Sequence[Any]) -> str:
