@@ -58,16 +58,6 @@ class FrameStatus(Enum):
         return self.name.lower()
 
 
-TRACED = frozenset(
-    status.identifier
-    for status in (
-        FrameStatus.OK, FrameStatus.ROLL_FITTED, FrameStatus.UNDER_RESOLVED, FrameStatus.SELF_CONTACT,
-        FrameStatus.CURVE_MISSING, FrameStatus.CURVE_UNUSABLE, FrameStatus.NOT_TO_DEPTH, FrameStatus.SIMULATE_FAILED,
-    )
-)  # fmt: skip
-"""Of frames whose trace is to be trusted, whatever became of the simulated wire."""
-
-
 class StageError(Exception):
     """A stage cannot go on; the message has the five parts (what, where, got, allowed, do this)."""
 

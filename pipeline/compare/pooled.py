@@ -147,12 +147,13 @@ def _with_intervals(frames: Sequence[Scored], points: Array, values: Row) -> dic
     return row | {"interval": told}
 
 
-def skill(
-    frames: Sequence[Scored], squares: Array, nulls: Array, name: str = "skill", rival: str = ""
-) -> dict[str, float]:
+SKILL_STRONGEST = "skill_strongest"
+
+
+def skill(frames: Sequence[Scored], squares: Array, nulls: Array, rival: str = "") -> dict[str, float]:
     """Skill, with its interval, against a predictor's sums of squares (frames,), over the frames that have one.
 
-    name : of the column; those of the ends follow from it.     rival : the predictor's own.
+    rival : the strongest predictor's name; empty: the centreline.
     """
     known = np.isfinite(nulls)
     if not nulls[known].sum() > 0:
@@ -162,7 +163,7 @@ def skill(
     points = np.array([len(frame.error_mm) for frame in kept], dtype=float)
     rest = without_each(kept, squares, nulls) if rival == ANOTHER else None
     ends = intervals.of_log_ratio(*by_insertion(kept, squares, nulls, points), rest=rest)
-    value = 1.0 - float(squares.sum() / nulls.sum())
+    name, value = SKILL_STRONGEST if rival else "skill", 1.0 - float(squares.sum() / nulls.sum())
     # less error is more skill: the ends change places
     low, high = intervals.holding(value, 1.0 - float(np.exp(ends.high)), 1.0 - float(np.exp(ends.low)))
     return {name: value, f"{name}_low": low, f"{name}_high": high}
@@ -188,7 +189,6 @@ def without_each(frames: Sequence[Scored], squares: Array, nulls: Array) -> Arra
     return rest
 
 
-SKILL_STRONGEST = "skill_strongest"
 LEAST_SHARE = 0.5
 """Share of the points for which a predictor must have a guess to take part, and all that take part must have one
 together: the first frame has no previous one, and no path leads to some tips."""
@@ -213,7 +213,7 @@ def strongest(frames: Sequence[Scored], squares: Array, points: Array) -> dict[s
     if not names:
         return result
     best = min(names, key=lambda name: float(nulls[name][common].sum()))
-    found = skill(frames, squares, np.where(common, nulls[best], np.nan), SKILL_STRONGEST, best)
+    found = skill(frames, squares, np.where(common, nulls[best], np.nan), best)
     if not found:
         return result
     insertions = len({frame.insertion for frame, judged in zip(frames, common, strict=True) if judged})

@@ -59,15 +59,16 @@ def _with_another(case: Found, shared: Sequence[Found], traces: Mapping[str, Tra
     """The case, with the RMS distance of other insertions' nearest traces to the frame's own trace in each row."""
     phantom = [c for c in shared if c.result.phantom == case.result.phantom]
     kin = [(c.insertion, traces[c.result.case]) for c in phantom if c.insertion != case.insertion]
-    others, frames = Others(kin, traces[case.result.case]), dict(case.frames)
-    for number, (depth, curve) in traces[case.result.case].items():
-        near = others.nearest(depth, curve) if number in frames else ()
-        if near:
-            arc, guesses = scored(samples(depth, STEP_MM), skip_mm), dict[str, tuple[float, int]]()
-            for insertion, wire in near:
-                off = point_to_curve(at_arc(wire, arc), curve)[0]
-                squares, count = guesses.get(insertion, (0.0, 0))
-                guesses[insertion] = squares + float(np.sum(off**2)), count + len(off)
+    own, frames = traces[case.result.case], dict(case.frames)
+    others = Others(kin, own)
+    for number in frames.keys() & own:
+        depth, curve = own[number]
+        arc, guesses = scored(samples(depth, STEP_MM), skip_mm), dict[str, tuple[float, int]]()
+        for insertion, wire in others.nearest(depth, curve):
+            off = point_to_curve(at_arc(wire, arc), curve)[0]
+            squares, count = guesses.get(insertion, (0.0, 0))
+            guesses[insertion] = squares + float(np.sum(off**2)), count + len(off)
+        if guesses:
             squares, count = np.sum([*guesses.values()], axis=0)
             row = {**frames[number].row, f"null_{ANOTHER}_rms_mm": float(np.sqrt(squares / count))}
             frames[number] = frames[number]._replace(row=row, guesses=guesses)

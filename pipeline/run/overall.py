@@ -15,7 +15,7 @@ from pipeline.compare import intervals
 from pipeline.compare.pooled import Scored, by_insertion, is_pooled, numbers, pooled, skill, squares_of, within
 from pipeline.run import ledger
 from pipeline.run.results import Result, found_results, lost, untold
-from pipeline.status import TRACED
+from pipeline.run.stages.known import UP_TO_TRACE
 from reports import tables
 from reports.case_files import find_cases
 from reports.schema import ERRORS, POINTS
@@ -86,12 +86,12 @@ def _found(out: Path, result: Result, insertion: str) -> Found:
         return Found(result, {})
     folder = out / "cases" / result.case
     try:
-        return Found(result, *_scored(folder, insertion), insertion)
+        return Found(result, *_scored(folder, result, insertion), insertion)
     except (OSError, EOFError, ValueError, KeyError) as error:
         return Found(lost(result.case, "damaged", f"{folder / POINTS.file}: {error}", result), {})
 
 
-def _scored(folder: Path, insertion: str) -> tuple[dict[int, Scored], dict[int, float]]:
+def _scored(folder: Path, result: Result, insertion: str) -> tuple[dict[int, Scored], dict[int, float]]:
     """The frames that count, and the depths of those whose trace is trusted."""
     if not (folder / ERRORS.file).exists():
         return {}, {}
@@ -102,7 +102,8 @@ def _scored(folder: Path, insertion: str) -> tuple[dict[int, Scored], dict[int, 
     rows = [{str(k): None if v is pd.NA or v != v else v for k, v in row.items()} for row in errors.to_dict("records")]
     scored = [Scored(row, error[own[row["frame"]]], arc[own[row["frame"]]], insertion) for row in rows]
     counted = {int(one.row["frame"]): one for one in scored if is_pooled(one.row, one.error_mm)}
-    known = errors[errors["status"].isin(TRACED) & errors["insertion_mm"].notna()]
+    trusted = {frame["frame"] for frame in result.frames if frame.get("stage") not in UP_TO_TRACE}
+    known = errors[errors["frame"].isin(trusted) & errors["insertion_mm"].notna()]
     return counted, dict(zip(known["frame"].astype(int), known["insertion_mm"].astype(float), strict=True))
 
 
@@ -219,4 +220,4 @@ def skill_beside(before: Sequence[Found], after: Sequence[Found], null: str) -> 
     second = [frame._replace(guesses=first.guesses) for first, frame in both]
     points = np.array([float(len(frame.error_mm)) for frame in second])
     nulls = points * numbers([frame for frame, _ in both], f"null_{null}_rms_mm") ** 2
-    return skill(second, squares_of(second), nulls, "skill_strongest", null)
+    return skill(second, squares_of(second), nulls, null)

@@ -83,6 +83,11 @@ class Result:
         """Whether every frame is ok, or simulated where there is nothing to compare with."""
         return self.status in GOOD
 
+    @property
+    def frame_count(self) -> int:
+        """Number of frames that were planned."""
+        return int(self.summary["frames"])
+
     def write(self, folder: Path) -> None:
         """Write it into the case's folder."""
         own = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "details"}
@@ -154,8 +159,7 @@ def lost(name: str, status: str, reason: str, case: Case | Result | None = None,
     case : what is known of it, so that its frames are not missing among those that were planned.
     """
     sentence = LOST[status]
-    role, group = (case.role, case.group) if case else ("", "")
-    frames = case.summary["frames"] if isinstance(case, Result) else case.frame_count if case else 0
+    role, group, frames = (case.role, case.group, case.frame_count) if case else ("", "", 0)
     summary: dict[str, Any] = {"case": name, "group": group, "role": role, "status": status}
     summary |= {"frames": frames, "frames_ok": 0, "frames_failed": frames}
     summary |= {"within_1mm": 0.0} if frames else {}

@@ -48,12 +48,13 @@ def write_comparison(out: Path, folders: Mapping[str, Path]) -> list[str]:
     for one, other in pairs:
         both = ratio(studies[other], studies[one])
         if both is not None:
+            caveat = _caveat(off & {one, other})
             values = {"rms_ratio": both.value, "rms_ratio_low": both.low, "rms_ratio_high": both.high}
-            row, told = intervals.fields(values, "; ".join([both.note, *_caveat(off & {one, other})]))
+            row, told = intervals.fields(values, "; ".join([both.note, *caveat]))
             rows.append({"simulator": one, "against": other, "common_frames": both.frames, "interval": told, **row})
             if other == OURS:
                 said = both.sentence.replace("the second run / the first", f"{one} / {OURS}")
-                sentences.append("; ".join([said, *_caveat(off & {one, other})]))
+                sentences.append("; ".join([said, *caveat]))
     tables.write(out / SIMULATORS.file, SIMULATORS, rows)
     tables.write(out / WHERE.file, WHERE, [] if mixed else list(_where(folders, studies, off)))
     return sentences

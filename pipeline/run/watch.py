@@ -76,7 +76,8 @@ class Watch:
         if self.silent or self.bar or total < 2:
             return
         passed = time.time() - self._start
-        rest = f", about {rest}" if (rest := self._rest(done)) else ""
+        left = self._rest(done)
+        rest = f", about {left}" * bool(left)
         what = job.label if job.pictures else f"{job.label} with {job.out.name}"
         self.stream.write(f"{done}/{total} in {_clock(passed)}{rest}: {what} {error or became(job.folder)}\n")
         self.stream.flush()

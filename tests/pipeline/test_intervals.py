@@ -41,7 +41,7 @@ def test_the_intervals_hold_the_true_value_about_as_often_as_they_say(condition:
 
 @pytest.mark.parametrize("insertions", [3, 4, 6])
 def test_so_do_those_against_other_insertions_which_share_each_other(insertions: int) -> None:
-    """As if they did not they held it in 77 to 79 %. Of three, of which two are left, more: in 99 %."""
+    """As if they did not they held it in 76 to 78 %. Of three, of which two are left, more: in 99 %."""
     assert coverage_by_partners(insertions, 400) >= 0.887
 
 

@@ -41,7 +41,9 @@ def write_case(out: Path, name: str, errors_mm: list[float], statuses: list[str]
     status = "ok" if good == len(rows) else next(s for s in statuses if s != "ok")
     summary = {"case": name, "group": name, "role": "validation", "status": status, "frames": len(rows)}
     summary |= {"frames_ok": good, "frames_failed": len(rows) - good}
+    stages = {"ok": "", "max_iterations": "simulate"}
     said = [{"frame": r["frame"], "status": r["status"], "sentence": "", "message": ""} for r in rows]
+    said = [frame | {"stage": stages.get(frame["status"], "trace")} for frame in said]
     whole = {"case": name, "role": "validation", "group": name, "status": status, "sentence": "", "frames": said}
     whole |= {"failures": [], "summary": summary | {k: v for k, v in result.items() if k in summary}} | result
     (folder / "result.json").write_text(json.dumps(whole), encoding="utf-8")
@@ -109,6 +111,13 @@ def test_a_damaged_case_does_not_improve_the_share_either(study: Path) -> None:
     assert whole["within_1mm"] == pytest.approx(before["within_1mm"] - 1 / before["frames"])
     row = pd.read_csv(study / "summary.csv").set_index("case").loc["b"]
     assert (row["status"], row["role"], row["frames"], row["within_1mm"]) == ("damaged", "validation", 2, 0.0)
+
+
+def test_a_trace_is_trusted_whatever_the_solver_said_of_its_wire(study: Path) -> None:
+    """As ``Frame.trusted_curve``: a list of statuses had none of the solver's own."""
+    traced = {case.result.case: case.traced_mm for case in found_cases(study)}
+    assert traced["a"] == {0: 10.0, 1: 11.0}, "its third trace has another length than is stated"
+    assert traced["b"] == {0: 10.0, 1: 11.0}, "its second wire did not converge"
 
 
 def test_a_skill_over_fewer_insertions_says_so(study: Path) -> None:

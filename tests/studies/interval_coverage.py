@@ -93,7 +93,7 @@ def covered_by_partners(draw: np.random.Generator, insertions: int) -> bool:
         scored.append(Scored({}, np.array([np.sqrt(mean_square)]), np.zeros(1), str(n), guesses))
     nulls = np.array([np.mean([square for square, _ in frame.guesses.values()]) for frame in scored])
     found = skill(scored, squares, nulls, rival=ANOTHER)
-    return bool(found["skill_low"] <= 1.0 - 1.0 / (2.0 * 45.0**2 / 3.0) <= found["skill_high"])
+    return bool(found["skill_strongest_low"] <= 1.0 - 1.0 / (2.0 * 45.0**2 / 3.0) <= found["skill_strongest_high"])
 
 
 def coverage_by_partners(insertions: int, repetitions: int) -> float:

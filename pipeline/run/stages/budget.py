@@ -185,14 +185,13 @@ class Work:
         """
         calm = [i for i, n in enumerate(self.numbers) if (b := found[n]) is not None and b.shapes is None]
         rows = [self._alone(source, calm) for source in SOURCES if np.any(getattr(alone(self.sigmas, source), source))]
-        budgets, frames = [found[self.numbers[i]] for i in calm], [self.frames[i] for i in calm]
-        pairs = [(b, f) for b, f in zip(budgets, frames, strict=True) if b]
+        pairs = [(b, self.frames[i]) for i in calm if (b := found[self.numbers[i]]) is not None]
         ends = (
-            ("inputs", "all of these", [b.input_mm for b in budgets if b]),
+            ("inputs", "all of these", [b.input_mm for b, _ in pairs]),
             ("segments", "half of num_mm", [np.full(len(b.input_mm), ROUND * self._segments_mm(f)) for b, f in pairs]),
-            ("trace", "its own", [ROUND * self.trace_mm(frame) for frame in frames]),
-            ("u_val", "inputs, segments, trace", [b.whole_mm for b in budgets if b and b.whole_mm is not None]),
-            ("error", "simulated to traced", [f.comparison.error_mm for f in frames if f.comparison is not None]),
+            ("trace", "its own", [ROUND * self.trace_mm(f) for _, f in pairs]),
+            ("u_val", "inputs, segments, trace", [b.whole_mm for b, _ in pairs if b.whole_mm is not None]),
+            ("error", "simulated to traced", [f.comparison.error_mm for _, f in pairs if f.comparison is not None]),
         )
         return rows + [_row(name, said, values) for name, said, values in ends if calm]
 

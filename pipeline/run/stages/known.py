@@ -27,6 +27,9 @@ from pipeline.study.settings import Config
 from reports.frames_file import ScanCrop, Straightened
 from solver import Solution, Status
 
+UP_TO_TRACE = "load", "trace"
+"""Stages of which a frame that failed there has no trace to be trusted."""
+
 
 @dataclass(frozen=True, eq=False)
 class Frame:
@@ -81,7 +84,7 @@ class Frame:
     @property
     def trusted_curve(self) -> Curve | None:
         """The traced curve of a frame that loading and tracing found nothing wrong with."""
-        return self.curve if self.traced and self.stage not in ("load", "trace") else None
+        return self.curve if self.traced and self.stage not in UP_TO_TRACE else None
 
     @property
     def solved(self) -> Solution | None:
