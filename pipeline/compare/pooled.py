@@ -1,6 +1,7 @@
 """Pooled statistics of frames, and their intervals over insertions. Points are pooled, RMSEs never averaged."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,7 +22,8 @@ class Scored(NamedTuple):
     """A frame that counts: its row, its point errors (n,) in mm and the insertion that it belongs to.
 
     arc_mm : (n,) where the points lie along the wire, from the entry.     guesses : where the predictor ``another`` has
-    a guess, by insertion that it is made of the sum of squares in mm^2 and the number of points.
+    a guess, by insertion that it is made of the sum of squares in mm^2 and the number of points.     case : that the
+    frame is of; an insertion may have several.
     """
 
     row: Row
@@ -29,6 +31,7 @@ class Scored(NamedTuple):
     arc_mm: Array
     insertion: str
     guesses: Mapping[str, tuple[float, int]] = {}
+    case: str = ""
 
 
 def is_pooled(row: Row, error_mm: Array | None) -> bool:
@@ -125,12 +128,12 @@ def _with_intervals(frames: Sequence[Scored], points: Array, values: Row) -> dic
     """
     squares, nulls = squares_of(frames), points * numbers(frames, "null_centreline_rms_mm") ** 2
     names = list(dict.fromkeys(frame.insertion for frame in frames))
-    own = [[frame for frame in frames if frame.insertion == name] for name in names]
+    parts = [[frame for frame in frames if frame.insertion == name] for name in names]
     ends = np.exp(0.5 * np.array(intervals.of_log_ratio(*by_insertion(frames, squares, points, points))))
     rms_ends = intervals.holding(values["rms_mm"], *map(float, ends))
-    tips = intervals.of_medians([numbers(part, "tip_mm") for part in own])
+    tips = intervals.of_medians([numbers(part, "tip_mm") for part in parts])
     tips = intervals.holding(values["tip_median_mm"], *tips)
-    mean_squares = [np.array([float(np.mean(f.error_mm**2)) for f in part]) for part in own]
+    mean_squares = [np.array([float(np.mean(f.error_mm**2)) for f in part]) for part in parts]
     found = {
         "insertions": len(names),
         "effective_frames": intervals.effective_frames(mean_squares),
@@ -139,11 +142,10 @@ def _with_intervals(frames: Sequence[Scored], points: Array, values: Row) -> dic
         "tip_low_mm": tips.low,
         "tip_high_mm": tips.high,
         **skill(frames, squares, nulls),
-        **strongest(frames, squares, points),
     }
-    own_note, fewer = intervals.note(len(names)), found.get("strongest_insertions", len(names))
-    said = own_note if fewer == len(names) else f"{own_note}; {SKILL_STRONGEST} {intervals.note(fewer)}"
-    row, told = intervals.fields(found, said)
+    best, said = strongest(frames, squares, points)
+    own = intervals.note(len(names))
+    row, told = intervals.fields(found | best, own if said in ("", own) else f"{own}; {SKILL_STRONGEST} {said}")
     return row | {"interval": told}
 
 
@@ -186,7 +188,16 @@ def without_each(frames: Sequence[Scored], squares: Array, nulls: Array) -> Arra
                 rest[1, number[name]] += len(frame.error_mm) * (whole - its) / (count - points) - null
             else:  # without this insertion the frame has no guess
                 rest[:, number[name]] -= square, null
+    if one := all_guesses_of(frames):
+        rest[:, number[one]] = np.nan
     return rest
+
+
+def all_guesses_of(frames: Sequence[Scored]) -> str:
+    """The insertion of which all guesses of the others' frames are made: nothing is left without it. Empty: none."""
+    names = dict.fromkeys(frame.insertion for frame in frames)
+    found = (one for one in names if all(frame.guesses.keys() <= {one} for frame in frames if frame.insertion != one))
+    return next(found, "")
 
 
 LEAST_SHARE = 0.5
@@ -194,31 +205,42 @@ LEAST_SHARE = 0.5
 together: the first frame has no previous one, and no path leads to some tips."""
 
 
-def strongest(frames: Sequence[Scored], squares: Array, points: Array) -> dict[str, Any]:
+def strongest(frames: Sequence[Scored], squares: Array, points: Array) -> tuple[dict[str, Any], str]:
     """Skill against the strongest predictor, the one with the least error of those that are told nothing of the frame.
 
-    Also its name. All are judged on the same frames, ``strongest_frames`` of them: a predictor without a guess for the
-    hardest one would look strong, or be beaten by much, for that alone.
+    Also its name, and the note on its interval. All are judged on the same frames, ``strongest_frames`` of them: a
+    predictor without a guess for the hardest one would look strong, or be beaten by much, for that alone.
     """
-    depths = [
-        numbers([f for f in frames if f.insertion == one], "insertion_mm") for one in {f.insertion for f in frames}
-    ]
-    steps = np.abs(np.concatenate([np.diff(own) for own in depths]))
-    result: dict[str, Any] = {"frame_spacing_mm": float(np.median(steps)) if len(steps) else float("nan")}
+    result: dict[str, Any] = {"frame_spacing_mm": frame_spacing(frames)}
     nulls = {name: points * numbers(frames, f"null_{name}_rms_mm") ** 2 for name in rivals()}
     if ANOTHER in nulls and np.isfinite(nulls[ANOTHER]).any():
         known = np.isfinite(nulls[ANOTHER])
         result["null_another_rms_mm"] = float(np.sqrt(nulls[ANOTHER][known].sum() / points[known].sum()))
     names, common = judged({name: np.isfinite(of) for name, of in nulls.items()}, points)
     if not names:
-        return result
+        return result, ""
     best = min(names, key=lambda name: float(nulls[name][common].sum()))
     found = skill(frames, squares, np.where(common, nulls[best], np.nan), best)
     if not found:
-        return result
-    insertions = len({frame.insertion for frame, judged in zip(frames, common, strict=True) if judged})
-    on = {"strongest_null": best, "strongest_frames": int(common.sum()), "strongest_insertions": insertions}
-    return result | on | found
+        return result, ""
+    kept = [frame for frame, is_common in zip(frames, common, strict=True) if is_common]
+    insertions = len({frame.insertion for frame in kept})
+    on = {"strongest_null": best, "strongest_frames": len(kept), "strongest_insertions": insertions}
+    return result | on | found, note_of_strongest(kept, best, insertions)
+
+
+def note_of_strongest(frames: Sequence[Scored], rival: str, insertions: int) -> str:
+    """As ``intervals.note``, and why there is none where all guesses hang on one insertion."""
+    one = all_guesses_of(frames) if rival == ANOTHER and insertions >= intervals.FEWEST else ""
+    return f"interval withheld: without {one} no frame has a guess" if one else intervals.note(insertions)
+
+
+def frame_spacing(frames: Sequence[Scored]) -> float:
+    """Median step in depth, mm, from a frame to the next one of its case; NaN where no case has two."""
+    depths = numbers(frames, "insertion_mm")
+    follows = [(a.insertion, a.case) == (b.insertion, b.case) for a, b in pairwise(frames)]
+    steps = np.abs(np.diff(depths))[follows]
+    return float(np.median(steps)) if len(steps) else float("nan")
 
 
 def judged(known: Mapping[str, NDArray[np.bool_]], points: Array) -> tuple[list[str], NDArray[np.bool_]]:

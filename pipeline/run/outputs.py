@@ -39,7 +39,9 @@ def summary_row(case: Case, known: Known, errors: Sequence[Row]) -> dict[str, An
     head |= {"frames": len(planned), "frames_ok": count, "frames_failed": len(planned) - count}
     head["frames_fitted"] = len(known.frames) - len(planned)
     pairs = [(row, f.comparison) for row, f in zip(errors, known.frames, strict=True) if f.comparison is not None]
-    scored = [Scored(row, c.error_mm, c.arc_mm, case.group) for row, c in pairs if is_pooled(row, c.error_mm)]
+    scored = [
+        Scored(row, c.error_mm, c.arc_mm, case.group, case=case.id) for row, c in pairs if is_pooled(row, c.error_mm)
+    ]
     if case.compared:
         head["within_1mm"] = within(errors, len(planned))
     wires = [wire for frame in known.frames if (wire := frame.simulated_wire) is not None]

@@ -100,7 +100,8 @@ def _scored(folder: Path, result: Result, insertion: str) -> tuple[dict[int, Sco
     own = {number: frame == number for number in errors["frame"]}
     # field by field: pandas takes ten times as long for the few rows of a case
     rows = [{str(k): None if v is pd.NA or v != v else v for k, v in row.items()} for row in errors.to_dict("records")]
-    scored = [Scored(row, error[own[row["frame"]]], arc[own[row["frame"]]], insertion) for row in rows]
+    mine = [own[row["frame"]] for row in rows]
+    scored = [Scored(row, error[m], arc[m], insertion, case=result.case) for row, m in zip(rows, mine, strict=True)]
     counted = {int(one.row["frame"]): one for one in scored if is_pooled(one.row, one.error_mm)}
     trusted = {frame["frame"] for frame in result.frames if frame.get("stage") not in UP_TO_TRACE}
     known = errors[errors["frame"].isin(trusted) & errors["insertion_mm"].notna()]
