@@ -66,7 +66,8 @@ def _fit(args: argparse.Namespace, cases: "tuple[Case, ...]", config: "Config", 
     for one in written.estimate:
         sd = spread_in_words(one.sd, logarithmic=one.logarithmic)
         unseen = f"  not seen in these traces, stays as stated; the fit alone gave {one.value:g}: {one.why}"
-        verdict = "" if one.seen else unseen
+        apart = f"  of {one.value:g}, with what is not seen free as well" * (f"{one.value:g}" != f"{one.used:g}")
+        verdict = apart if one.seen else unseen
         say(f"{one.name:20s} {one.used:10g}  +- {sd:8s}{verdict}")
     for warning in (*misfit(fit), *flattened(found)):
         say(f"warning: {warning}")

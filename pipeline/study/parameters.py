@@ -134,9 +134,10 @@ def with_parameters(case: "Case", found: Parameters, data: Sequence[str], *, sco
 
     profiles = {name: getattr(found, name) for name in ("bending_stiffness_N_mm2", "rest_curvature_per_mm")}
     stiffness = {w.stated_N_mm2: w.stiffness_N_mm2 for w in found.wall}.get(case.wall.stiffness_N_mm2)
+    friction = case.wall.friction if "friction" in found.unseen else found.friction
     changes: dict[str, Any] = {
         "wire": replace(case.wire, **profiles),
-        "wall": replace(case.wall, stiffness_N_mm2=stiffness or case.wall.stiffness_N_mm2, friction=found.friction),
+        "wall": replace(case.wall, stiffness_N_mm2=stiffness or case.wall.stiffness_N_mm2, friction=friction),
         "calibrated": _told(case, found, known_wall=stiffness is not None),
         "calibrated_scans": () if score_used else tuple(scan for used in found.used for scan in used.data),
     }

@@ -25,7 +25,7 @@ from pipeline.compare.pooled import is_pooled
 from pipeline.model import Clamp, Curve, Lumen, Wall, Wire
 from pipeline.run.cache import Store
 from pipeline.run.calibrated import as_calibrated, data_of
-from pipeline.run.calibration import gathered
+from pipeline.run.calibration import gathered, over_insertions
 from pipeline.run.calibration_files import flattened, misfit
 from pipeline.run.log import Log
 from pipeline.run.outputs import error_row, summary_row
@@ -244,6 +244,37 @@ def test_a_run_takes_the_parameters(study):
     assert "taper" in case.calibrated
     assert "no wall stated at 7 N/mm2" in case.calibrated
     assert "'a' was calibrated with and is not scored" in notes[0]
+
+
+def test_a_friction_that_was_not_seen_stays_as_the_case_states_it(study):
+    """A case stated at 0.3 ran with the 0.03 of those calibrated with, and the page said: as stated."""
+    manifest, file = study / "manifest.toml", study / "p.toml"
+    manifest.write_text(manifest.read_text(encoding="utf-8") + "friction = 0.3\n", encoding="utf-8")
+    (case,), _ = as_calibrated(read_manifest(manifest).cases, file)
+    assert case.wall.friction == 0.03, "it was seen"
+    file.write_text(file.read_text(encoding="utf-8").replace('name = "taper"', 'name = "friction"'), encoding="utf-8")
+    (case,), _ = as_calibrated(read_manifest(manifest).cases, file)
+    assert case.wall.friction == 0.3
+    assert "not seen there, as stated: friction" in case.calibrated
+
+
+def test_cases_of_different_friction_are_not_calibrated_together(study, capsys):
+    """They were, with the mean of both, which neither states."""
+    manifest = study / "manifest.toml"
+    text = manifest.read_text(encoding="utf-8").replace('id = "b"', 'id = "b"\nrole = "calibration"')
+    manifest.write_text(text + "friction = 0.3\n", encoding="utf-8")
+    assert main(["calibrate", str(manifest), "-o", str(study / "out")]) == 2
+    told = "the calibration cases state 2 coefficients of friction (0 of 'a', 0.3 of 'b'), and one is fitted; state one"
+    assert told in capsys.readouterr().err
+
+
+def test_the_offset_of_depths_is_little_known_from_few_insertions():
+    """Two that happen to agree had a standard deviation of next to nothing; 95 % holds 1.96 of it, Student's t more."""
+    value, sd = over_insertions([0.40, 0.44], [0.0, 0.0])
+    assert (value, 1.96 * sd) == pytest.approx((0.42, 12.706 * 0.02), rel=1e-3)
+    draw = np.random.default_rng(2).normal(0.0, 0.3, (4000, 3))
+    found = [over_insertions(list(row), [0.0] * 3) for row in draw]
+    assert np.mean([abs(mean) <= 1.96 * sd for mean, sd in found]) == pytest.approx(0.95, abs=0.0105)  # three sigma
 
 
 def test_a_case_does_not_score_itself_under_another_name(study):
