@@ -90,7 +90,10 @@ def read_case(folder: Path, points: bool = True, rest: bool = True) -> CaseFiles
 
 
 def read_json(path: Path) -> dict[str, Any]:
-    """Read a JSON object; an absent file is an empty one. Raises ValueError where it is not an object."""
+    """Read a JSON object; an absent file is an empty one, and a key that is null says as little as one that is absent.
+
+    Raises ValueError where it is not an object.
+    """
     if not path.exists():
         return {}
     try:
@@ -99,7 +102,7 @@ def read_json(path: Path) -> dict[str, Any]:
         raise ValueError(f"{path}: not JSON ({error}); remove the folder and run the case again") from error
     if not isinstance(content, dict):
         raise ValueError(f"{path}: got a {type(content).__name__}, expected an object; run the case again")
-    return content
+    return {key: value for key, value in content.items() if value is not None}
 
 
 def warnings_of(folder: Path) -> list[str]:

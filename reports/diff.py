@@ -22,6 +22,7 @@ BEFORE_COMPARE = {
     *("trace_sigma_mm", "trace_mean_mm", "trace_max_mm", "trace_tip_mm"),
 }
 """What a run has that ended before frames are compared: no number of it says how far a simulated wire is off."""
+FITTED = "roll_fitted"
 CLOSING = ("regression", "moved")
 """Verdicts on a row for which a gate must close."""
 _HEADER = ["case", "frame", "column", "before", "after", "change", "allowed", "verdict"]
@@ -168,7 +169,7 @@ def diff_tables(
     tolerance: Mapping[str, float],
     damaged: Mapping[str, str] = MappingProxyType({}),
 ) -> Difference:
-    """Compare errors tables by case. A missing or damaged case, a missing frame, and a status less than ok regress."""
+    """Compare errors tables by case. A missing or damaged case, a missing frame, and one that fails now regress."""
     rows: list[Row] = []
     tolerance = {name: allowed for name, allowed in tolerance.items() if name != RATIO}
     for case in dict.fromkeys([*before, *after, *damaged]):
@@ -189,17 +190,30 @@ def _case_rows(before: pd.DataFrame, after: pd.DataFrame, tolerance: Mapping[str
     for frame in sorted({*old, *new}):
         if frame in old and frame in new:
             was, now = old[frame]["status"], new[frame]["status"]
-            verdict = "same" if was == now else "better" if now in GOOD else "regression"
+            verdict = _of_status(was, now)
             yield frame, "status", was, now, math.nan, math.nan, verdict
+            if (was == FITTED) != (now == FITTED):  # an error of a frame that the roll was fitted on is no score
+                continue
             for name, allowed in tolerance.items():
                 pair = (old[frame][name], new[frame][name])
                 a, b = (math.nan if pd.isna(value) else float(value) for value in pair)
-                if verdict != "regression" or not math.isnan(b):  # a frame that fails now counts once
+                if verdict in ("same", "better") or not math.isnan(b):  # a frame that fails now counts once
                     yield frame, name, a, b, b - a, allowed, _verdict(name, a, b, allowed)
         elif frame in old:
             yield frame, "frame", "present", "missing", math.nan, math.nan, "regression"
         else:
             yield frame, "frame", "missing", new[frame]["status"], math.nan, math.nan, "new"
+
+
+def _of_status(was: str, now: str) -> str:
+    """Of one failure for another, and of a frame that is scored in one run alone, nobody knows whether it is worse."""
+    if was == now:
+        return "same"
+    if now not in GOOD:
+        return "regression" if was in GOOD else "moved"
+    if FITTED in (was, now):
+        return "moved" if was in GOOD else "better"
+    return "regression" if was == "ok" else "better"
 
 
 def _verdict(name: str, old: float, new: float, allowed: float) -> str:

@@ -1,11 +1,12 @@
 """Several simulators of one study side by side: pooled errors, ratios of all pairs, and which one is nearer where.
 
-Each has an output folder of its own, like any run. Ratios are over the frames that count in both; along the wire and
-over depth, over those that count in all. Failed frames are reported, too, and shares are of the planned frames: a
-simulator gains nothing by failing in the hard ones.
+Each has an output folder of its own, like any run. Ratios are over the frames that count in both; skill, and errors
+along the wire and over depth, over those that count in all. Failed frames are reported, too, and shares are of the
+planned frames: a simulator gains nothing by failing in the hard ones.
 """
 
 from collections.abc import Iterator, Mapping, Sequence, Set
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -26,7 +27,9 @@ from reports.verdict import OURS, TIPS_OFF, tips_off
 
 STEPS_MM = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
 MOST_BINS = 12
+OF_SKILL = ("skill_strongest", "strongest_null", "strongest_frames")
 Studies = Mapping[str, Sequence[Found]]
+Frames = Set[tuple[str, int]]
 
 
 class Piece(NamedTuple):
@@ -42,7 +45,8 @@ def write_comparison(out: Path, folders: Mapping[str, Path]) -> list[str]:
     studies = {name: with_another(folder, found_cases(folder)) for name, folder in folders.items()}
     mixed = mixed_settings(*folders.values())
     pairs = [(one, other) for one in studies for other in studies if one != other and not mixed]
-    rows = [_alone(name, found) for name, found in studies.items()]
+    common = _common(studies)
+    rows = [_alone(name, found, common) for name, found in studies.items()]
     off = {row["simulator"] for row in rows if tips_off(row)}
     sentences = [mixed] * bool(mixed)
     for one, other in pairs:
@@ -56,7 +60,7 @@ def write_comparison(out: Path, folders: Mapping[str, Path]) -> list[str]:
                 said = both.sentence.replace("the second run / the first", f"{one} / {OURS}")
                 sentences.append("; ".join([said, *caveat]))
     tables.write(out / SIMULATORS.file, SIMULATORS, rows)
-    tables.write(out / WHERE.file, WHERE, [] if mixed else list(_where(folders, studies, off)))
+    tables.write(out / WHERE.file, WHERE, [] if mixed else list(_where(folders, studies, common, off)))
     return sentences
 
 
@@ -90,21 +94,35 @@ def side_by_side(out: Path, folders: Mapping[str, Path], embed: bool) -> list[st
     return [*said, f"score of {', '.join(folders)}.  side by side: {render_simulators(out, embed)}"]
 
 
-def _alone(name: str, found: Sequence[Found]) -> dict[str, Any]:
-    """A simulator's numbers as in its own overall.csv; where no frame counts, its planned frames with none ok."""
+def _common(studies: Studies) -> Frames:
+    """The frames, by case and number, that count for every simulator of which any does."""
+    kept = [
+        {(case.result.case, number) for case in validation(found) for number in case.frames}
+        for found in studies.values()
+    ]
+    return set.intersection(*filter(None, kept)) if any(kept) else set()
+
+
+def _alone(name: str, found: Sequence[Found], common: Frames) -> dict[str, Any]:
+    """A simulator's numbers as in its own overall.csv; where no frame counts, its planned frames with none ok.
+
+    Skill is over ``common`` frames: who lacks some would be held against another predictor, or on easier ones.
+    """
     used = validation(found)
-    planned = {"frames": sum(case.result.summary["frames"] for case in used), "frames_ok": 0, "within_1mm": 0.0}
-    row = planned | overall(found)
+    planned = {"frames": sum(case.result.frame_count for case in used), "frames_ok": 0, "within_1mm": 0.0}
+    alike = [
+        replace(c, frames={n: frame for n, frame in c.frames.items() if (c.result.case, n) in common}) for c in used
+    ]
+    own, skill = overall(found), overall(alike)
+    row = planned | own | {key: skill.get(key) for key in OF_SKILL if own}
     return {key: value for key, value in row.items() if key in SIMULATORS.names} | {"simulator": name}
 
 
-def _where(folders: Mapping[str, Path], studies: Studies, off: Set[str]) -> Iterator[dict[str, Any]]:
+def _where(folders: Mapping[str, Path], studies: Studies, common: Frames, off: Set[str]) -> Iterator[dict[str, Any]]:
     """For each bin of the distance from the tip and of the depth, every simulator's error and who is nearest.
 
     off : simulators whose tips lie off. Distances to the traced wire do not show that, so these are never the nearest.
     """
-    kept = [{(c.result.case, n) for c in validation(found) for n in c.frames} for found in studies.values()]
-    common = set.intersection(*kept)
     points = {name: list(_points(folders[name], found, common)) for name, found in studies.items()}
     for along, place in (("distance from the tip", 1), ("insertion depth", 2)):
         values = [np.max(part[place]) for parts in points.values() for part in parts]
@@ -122,7 +140,7 @@ Part = tuple[str, Array, Array, Array]
 """One frame: its insertion, distances from the tip (n,), its depth n times (n,), errors (n,); mm."""
 
 
-def _points(folder: Path, found: Sequence[Found], common: set[tuple[str, int]]) -> Iterator[Part]:
+def _points(folder: Path, found: Sequence[Found], common: Frames) -> Iterator[Part]:
     for case in validation(found):
         if not any((case.result.case, number) in common for number in case.frames):
             continue

@@ -226,6 +226,15 @@ def test_cases_that_the_manifest_names_no_more_count_nowhere(study: Path, capsys
     assert [c.result.case for c in found_cases(study)] == everything
 
 
+def test_what_is_null_in_a_result_says_as_little_as_what_is_absent(study: Path) -> None:
+    """A null for the settings, which other tools may write, was a traceback."""
+    for name in ("x", "y"):
+        write_case(study, name, [GOOD], config=None, provenance=None, inputs=None, warnings=None, phantom="one")
+    assert main(["report", str(study), "--overview"]) == 1, "other cases of this study have failed frames"
+    assert main(["report", str(study)]) == 1
+    assert np.isfinite(pd.read_csv(study / "overall.csv").loc[0, "rms_mm"])
+
+
 def test_cases_of_one_stated_insertion_that_share_scans_have_nothing_to_be_told(study: Path) -> None:
     """Only cases that state two insertions and show the same scans are told that they count as one."""
     for group, told in (("one", 0), ("two", 1)):

@@ -38,7 +38,9 @@ def write_tree(out: Path, law: Law, failed: tuple[tuple[int, int], ...] = (), ti
             rows.append(
                 row | {}
                 if bad
-                else row | {"rms_mm": np.sqrt(np.mean(error**2)), "p95_mm": error.max(), "tip_mm": tip_mm}
+                else row
+                | {"rms_mm": np.sqrt(np.mean(error**2)), "p95_mm": error.max(), "tip_mm": tip_mm}
+                | {"null_centreline_rms_mm": depth / 20}
             )
             if not bad:
                 parts.append(pd.DataFrame({"frame": f, "arc_mm": arc, "error_mm": error}))
@@ -92,6 +94,21 @@ def test_every_pair_on_the_frames_that_count_in_both(compared: Path) -> None:
     assert list(alone["frames"]) == [24, 24, 24], "planned ones, whatever failed"
     assert alone.loc["worse", "frames_ok"] == 21
     assert alone.loc["worse", "within_1mm"] == pytest.approx(21 / 24)
+
+
+def test_skill_is_over_the_same_frames_for_all(tmp_path: Path) -> None:
+    """The same wires but for one frame had 0.908 where all of them had 0.884."""
+    ours = write_tree(tmp_path / "wireval", even(0.2))
+    for name, statuses in (("fewer", ["ok", "ok", "ok", "no_wire"]), ("none", ["no_wire"] * 4)):
+        shutil.copytree(ours, tmp_path / name)
+        for case in (tmp_path / name / "cases").iterdir():
+            errors = pd.read_csv(case / ERRORS.file).assign(status=statuses)
+            tables.write(case / ERRORS.file, ERRORS, errors.to_dict("records"))
+    write_comparison(tmp_path, {"wireval": ours, "fewer": tmp_path / "fewer", "none": tmp_path / "none"})
+    alone = pd.read_csv(tmp_path / "simulators.csv").query("against.isna()").set_index("simulator")
+    assert list(alone["strongest_frames"].fillna(0)) == [18, 18, 0], "who has none at all takes nobody's away"
+    assert alone.loc["wireval", "skill_strongest"] == alone.loc["fewer", "skill_strongest"]
+    assert alone.loc["wireval", "rms_mm"] != alone.loc["fewer", "rms_mm"], "over its own frames"
 
 
 def test_who_failed_frames_stands_below_who_did_not(tmp_path: Path) -> None:

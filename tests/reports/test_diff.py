@@ -54,6 +54,27 @@ def test_verdicts(change: dict[str, object], column: str, verdict: str) -> None:
     assert ("1 value has moved: insertion_mm" in found.sentence) == (verdict == "moved")
 
 
+@pytest.mark.parametrize(
+    ("was", "now", "verdict"),
+    [
+        ("roll_fitted", "ok", "moved"),
+        ("ok", "roll_fitted", "moved"),
+        ("no_wire", "roll_fitted", "better"),
+        ("roll_fitted", "no_wire", "regression"),
+        ("no_wire", "not_to_depth", "moved"),
+        ("ok", "simulated", "regression"),
+        ("simulated", "ok", "better"),
+    ],
+)
+def test_a_status_is_worse_only_where_that_is_known(was: str, now: str, verdict: str) -> None:
+    """A frame that the roll was fitted on has an error, and no score to be held against another's."""
+    before, after = _row(status=was, rms_mm=0.1), _row(status=now, rms_mm=None if now == "simulated" else 0.9)
+    found = diff.diff_tables({"c": _table([before])}, {"c": _table([after])}, {"rms_mm": 0.1})
+    rows = found.rows.set_index("column")
+    assert rows.loc["status", "verdict"] == verdict
+    assert ("rms_mm" in rows.index) == ("roll_fitted" not in (was, now) and now != "simulated")
+
+
 def test_a_recovered_frame_is_no_regression() -> None:
     before = _table([{"frame": 0, "status": "no_wire"}])
     found = diff.diff_tables({"c": before}, {"c": _table([_row()])}, TOLERANCE)
