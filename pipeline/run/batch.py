@@ -5,13 +5,15 @@ worker dies again, the job is reported as lost. A dying worker of a cluster also
 begun, so that there only deaths count in which the job was alone.
 """
 
+import logging
 import sys
+from asyncio import CancelledError
 from collections.abc import Callable, Generator, Iterator, Sequence
-from concurrent.futures import Executor, Future, as_completed
 from contextlib import closing, contextmanager
+from queue import SimpleQueue
 from typing import Any, TypeVar
 
-from pipeline.run.outcome import LOST, Outcome, guarded
+from pipeline.run.outcome import GONE, LOST, Outcome, guarded
 from pipeline.run.workers import NO_LIMITS, Limits, in_processes
 from pipeline.status import UsageError
 
@@ -29,10 +31,10 @@ def run_all(
     or several workers and jobs; else in this process.
     """
     if address:
-        with _cluster(address) as executor:
+        with _cluster(address) as client:
 
             def there(part: Sequence[J]) -> Outcomes[J, R]:
-                return _on_cluster(executor, part, work)
+                return _on_cluster(client, part, work)
 
             yield from _again(jobs, there, lambda part: _again(part, there, there))
     elif limits.any or (workers > 1 and len(jobs) > 1):
@@ -60,17 +62,38 @@ def _again(
         yield from alone([job])
 
 
-def _on_cluster(executor: Executor, jobs: Sequence[J], work: Callable[[J], R]) -> Outcomes[J, R]:
-    futures: dict[Future[Outcome[J, R]], J] = {executor.submit(guarded, work, job): job for job in jobs}
+def _on_cluster(client: Any, jobs: Sequence[J], work: Callable[[J], R]) -> Outcomes[J, R]:
+    """Run jobs through a dask client.
+
+    Its own executor is not taken: where a worker dies of one job with the result of another, it may never tell of that.
+    """
+    if client.status != "running":  # what is handed to it now would never come back
+        yield from (Outcome[J, R](job, None, GONE, GONE, "scheduler_lost") for job in jobs)
+        return
+    # pure: dask would answer a repeated job with its earlier error instead of running it again
+    futures = {client.submit(guarded, work, job, pure=False): job for job in jobs}
+    done: SimpleQueue[Any] = SimpleQueue()
+    for future in futures:
+        future.add_done_callback(done.put)
     try:
-        for future in as_completed(futures):
-            # ``guarded`` raises nothing: an exception here is the cluster's report that the worker died
-            error = future.exception()
-            lost = Outcome[J, R](futures[future], None, LOST, f"{LOST} ({error!r})", "worker_lost")
-            yield future.result() if error is None else lost
+        for _ in futures:
+            future = done.get()
+            yield _outcome(future, futures[future])
     finally:
         for future in futures:
-            future.cancel()
+            if not future.done():
+                future.cancel()
+
+
+def _outcome(future: Any, job: J) -> Outcome[J, R]:
+    """What became of a job. ``guarded`` raises nothing: an exception here is dask's word on its worker or scheduler."""
+    try:
+        outcome: Outcome[J, R] = future.result()
+    except CancelledError as error:
+        return Outcome(job, None, GONE, f"{GONE} ({error})", "scheduler_lost")
+    except Exception as error:
+        return Outcome(job, None, LOST, f"{LOST} ({error!r})", "worker_lost")
+    return outcome
 
 
 def require_cluster(address: str) -> None:
@@ -91,10 +114,10 @@ def _client(address: str) -> Any:
 
 
 @contextmanager
-def _cluster(address: str) -> Iterator[Executor]:
-    """The executor of the dask scheduler at an address; raises UsageError where there is none."""
+def _cluster(address: str) -> Iterator[Any]:
+    """A client of the dask scheduler at an address; raises UsageError where there is none."""
     with _client(address) as client:
+        logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # a lost scheduler is told of by each job
         if not client.scheduler_info()["workers"]:
             sys.stderr.write(f"{address}: the scheduler has no worker yet; waiting for one\n")
-        # pure: dask would answer a repeated job with its earlier error instead of running it again
-        yield client.get_executor(pure=False)
+        yield client

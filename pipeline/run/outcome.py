@@ -10,14 +10,15 @@ from reports.atomic import WriteError
 J = TypeVar("J")
 R = TypeVar("R")
 LOST = "the worker process was killed twice (out of memory?); run this case alone with -j 1"
+GONE = "the dask scheduler went away, or the connection to it; give the same command again when it is there"
 
 
 @dataclass(frozen=True)
 class Outcome(Generic[J, R]):
     """A result, or an error with its traceback or the like in ``log``.
 
-    status : ``ok``, ``crashed``, ``worker_lost``, ``over_limit``, or ``unwritable`` where nothing can be written any
-    more, so that going on makes no sense.
+    status : ``ok``, ``crashed``, ``worker_lost``, ``scheduler_lost``, ``over_limit``, or ``unwritable`` where nothing
+    can be written any more, so that going on makes no sense.
     """
 
     job: J

@@ -29,6 +29,7 @@ from reports.case_files import GOOD, find_cases
 LOST = {
     "crashed": "the case ended in an unexpected error; its log has the traceback",
     "worker_lost": "the worker process was killed, twice; its log tells where it was",
+    "scheduler_lost": "the dask scheduler went away while the case ran or waited; give the same command again",
     "over_limit": "the case took more time or memory than it may; raise --case-timeout or --case-memory",
     "refused": "the case was left out, as its files cannot be used; mend what the message names, then run it",
     "removed": "the case's result was removed while the run went on; give the same command again",

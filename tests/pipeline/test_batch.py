@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import gc
 import os
+from asyncio import CancelledError
 from collections.abc import Iterator
 from concurrent.futures import Executor, Future
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -50,7 +51,10 @@ class KilledWorker(Exception):
 class Cluster(Executor):
     """A cluster as run_all sees it: jobs run at once, and a worker's death is an exception of the cluster's own."""
 
-    def submit(self, function: Any, /, *args: Any, **named: Any) -> Future[Any]:
+    status = "running"
+
+    def submit(self, function: Any, /, *args: Any, pure: bool = True, **named: Any) -> Future[Any]:
+        assert not pure, "dask would not run a job a second time"
         future: Future[Any] = Future()
         run, job = args
         folder = run.args[0]
@@ -71,6 +75,22 @@ def test_a_worker_of_a_cluster_that_dies_costs_its_job_alone(tmp_path: Path, mon
     monkeypatch.setattr(batch, "_cluster", cluster)
     found = run_all(range(8), partial(work, tmp_path), address="tcp://scheduler:8786")
     check({o.job: o for o in found}, tmp_path)
+
+
+def test_a_scheduler_that_goes_away_ends_what_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What was handed out is cancelled; what is handed to a client that is closed never comes back."""
+
+    class Gone(Cluster):
+        def submit(self, function: Any, /, *args: Any, pure: bool = True, **named: Any) -> Future[Any]:
+            future: Future[Any] = Future()
+            future.set_exception(CancelledError()) if args[1] else future.set_result(function(*args, **named))
+            return future
+
+    monkeypatch.setattr(batch, "_cluster", lambda _: nullcontext(Gone()))
+    found = {o.job: o for o in run_all(range(3), abs, address="tcp://scheduler:8786")}
+    assert [found[job].status for job in range(3)] == ["ok", "scheduler_lost", "scheduler_lost"]
+    monkeypatch.setattr(Gone, "status", "closed")
+    assert {o.status for o in run_all(range(3), abs, address="tcp://scheduler:8786")} == {"scheduler_lost"}
 
 
 def test_one_worker_runs_here_and_in_order(tmp_path: Path) -> None:

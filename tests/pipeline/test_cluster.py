@@ -9,6 +9,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 
@@ -39,19 +40,30 @@ def unseen_figures() -> None:
     """Figures are drawn in full here: the workers of a scheduler do, and theirs are compared."""
 
 
-@pytest.fixture(scope="module")
-def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    """Of the scheduler; the cluster runs in another folder than the test, as one on other machines does."""
-    folder = tmp_path_factory.mktemp("cluster")
+@contextmanager
+def cluster(folder: Path) -> Iterator[tuple[str, subprocess.Popen[str]]]:
+    """The address of a scheduler, and its process. It runs in another folder than the test, as on other machines."""
     (folder / "cluster.py").write_text(CLUSTER, encoding="utf-8")
     words = [sys.executable, str(folder / "cluster.py")]
     path = {"PYTHONPATH": os.pathsep.join([str(Path(__file__).parents[2]), *sys.path])}
     with subprocess.Popen(
-        words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=folder, env=os.environ | path
-    ) as cluster:
-        assert cluster.stdout is not None
-        yield cluster.stdout.readline().strip()
-        cluster.communicate("")
+        words,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+        cwd=folder,
+        env=os.environ | path,
+        start_new_session=True,
+    ) as process:
+        assert process.stdout is not None
+        yield process.stdout.readline().strip(), process
+        process.communicate("")
+
+
+@pytest.fixture(scope="module")
+def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    with cluster(tmp_path_factory.mktemp("cluster")) as (place, _):
+        yield place
 
 
 def work(folder: Path, job: int) -> int:
@@ -91,6 +103,18 @@ def test_a_worker_killed_in_the_middle_of_a_case_costs_nothing(address: str, tmp
     run.join()
     assert codes == [0]
     assert differences(first, second) == []
+
+
+def test_a_scheduler_that_goes_away_is_told_of_and_what_is_done_is_kept(tmp_path: Path) -> None:
+    """It was waited for, for ever."""
+    with cluster(tmp_path) as (address, process):
+        outcomes = run_all([0.0, 0.1, 600.0, 601.0, 602.0], time.sleep, address=address)
+        found = [next(outcomes), next(outcomes)]
+        os.killpg(process.pid, signal.SIGKILL)
+        found += outcomes
+    assert {o.job: o.status for o in found} == {0.0: "ok", 0.1: "ok"} | dict.fromkeys(
+        (600.0, 601.0, 602.0), "scheduler_lost"
+    )
 
 
 def test_a_scheduler_that_does_not_answer_leaves_the_folder_alone(
