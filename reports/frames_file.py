@@ -118,7 +118,7 @@ def write_frames(path: Path, scan: ScanCrop | None, frames: Iterable[FrameArrays
                     values.attrs["unit"] = name.rpartition("_")[2] if name.endswith(("_mm", "_N")) else "1"
             _write_pictures(group, "mip", frame.mips)
             if frame.straightened is not None:
-                planes = group.create_dataset("straightened", data=frame.straightened.values, **_PACKED)
+                planes = _packed(group, "straightened", frame.straightened.values)
                 planes.attrs.update(dict(zip(_OF_PLANES, frame.straightened[1:], strict=True)))
     write_bytes(path, whole.getvalue())
 
@@ -169,7 +169,14 @@ def _read_straightened(group: Any) -> Straightened | None:
 
 def _write_pictures(group: Any, prefix: str, pictures: Pictures) -> None:
     for axis, picture in pictures.items():
-        group.create_dataset(f"{prefix}_{axis}", data=picture, **_PACKED)
+        _packed(group, f"{prefix}_{axis}", picture)
+
+
+def _packed(group: h5py.Group, name: str, values: NDArray[np.uint8]) -> h5py.Dataset:
+    """A packed dataset in the file. Left to HDF5, its bytes go there whenever the garbage collector comes by."""
+    dataset = group.create_dataset(name, data=values, **_PACKED)
+    dataset.flush()
+    return dataset
 
 
 def _read_pictures(group: Any, prefix: str) -> Pictures:
