@@ -19,7 +19,7 @@ class Seen(NamedTuple):
 
     arc_mm (n,), nominal_mm (n, 3) : where the wires are looked at.     curve_mm (m, 3), foot_arc_mm (n,) : the traced
     wire and its places nearest to these; None without one.     own_mm2 (n,) : variance along each axis across the wire
-    of the trace and of the segments.
+    of the trace and of the segments.     ahead_mm : how far the traced wire begins beyond the plane of the clamp.
     """
 
     arc_mm: Array
@@ -27,6 +27,7 @@ class Seen(NamedTuple):
     curve_mm: Array | None = None
     foot_arc_mm: Array | None = None
     own_mm2: Array | None = None
+    ahead_mm: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,8 +59,8 @@ def frame_budget(wires: Array, seen: Seen) -> Budget | None:
     wires = wires[np.isfinite(wires).all(axis=(1, 2))]
     if len(wires) < FEWEST:
         return None
-    arc, nominal, curve, foot, own = seen
-    real = None if curve is None else at_arc(curve, arc)
+    arc, nominal, curve, foot, own, ahead_mm = seen
+    real = None if curve is None else at_arc(curve, arc - ahead_mm)
     shapes = shapes_of(wires, nominal, real, arc)
     near = wires if shapes is None or shapes.with_simulated.sum() < FEWEST else wires[shapes.with_simulated]
     away = near - nominal

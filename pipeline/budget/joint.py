@@ -29,7 +29,7 @@ def coefficients(wires: Array, seen: Seen, sight: Sight, voxel_mm: float, rng: n
 
     sight : the trace's error at all points of the wire.     None where nothing was traced or the wire is too short.
     """
-    arc, nominal, curve, foot, _ = seen
+    arc, nominal, curve, foot = seen[:4]
     if curve is None or foot is None:
         return None
     end = arc >= arc[-1] - DISTAL_MM

@@ -30,14 +30,20 @@ class Comparison(Pair):
 
 
 def compare(
-    simulated: Simulated, traced: Curve, lumen: Lumen, config: CompareConfig = CompareConfig(), way: Way | None = None
+    simulated: Simulated,
+    traced: Curve,
+    lumen: Lumen,
+    config: CompareConfig = CompareConfig(),
+    way: Way | None = None,
+    ahead_mm: float = 0.0,
 ) -> Comparison:
     """Errors of one simulated wire against the traced one; refuses an empty curve with ValueError.
 
     way : the vessel's axis and branches, which all frames share; without it there are the lumen's branches and no axis.
+    ahead_mm : how far the traced curve begins beyond the plane in which the wire does.
     """
     start = traced.points_mm[:1] if len(traced.points_mm) else np.zeros((1, 3))
-    pair = pair_of(simulated, traced, lumen, config, way or Way(None, branches_of(lumen.distance, start[0])))
+    pair = pair_of(simulated, traced, lumen, config, way or Way(None, branches_of(lumen.distance, start[0])), ahead_mm)
     values = {name: measured(name, metric, pair) for name, metric in METRICS.items()}
     return Comparison(**vars(pair), values=values)
 

@@ -84,8 +84,8 @@ class Pair:
     sample_mm (n, 3), arc_mm (n,) : equal steps along the wire behind the clamp's reach, so that neither the segment
     length nor the density of the trace can flatter.     error_mm, foot_arc_mm (n,) : distance of each to the curve,
     and where along it that is.     back_mm : distances the other way, from equal steps along the curve, behind the
-    reach, to the wire.     by_arc_mm : distances between points of equal arc length.     lumen : the vessel.
-    way : the vessel's axis and branches.
+    reach, to the wire.     equal_mm (2, c, 3) : points of the wire and of the curve at equal arc lengths, behind the
+    reach, as far as both go.     lumen : the vessel.     way : the vessel's axis and branches.
     """
 
     wire_mm: Array
@@ -96,9 +96,15 @@ class Pair:
     error_mm: Array
     foot_arc_mm: Array
     back_mm: Array
-    by_arc_mm: Array
+    equal_mm: Array
     lumen: Lumen
     way: Way
+
+    @property
+    def by_arc_mm(self) -> Array:
+        """Distances (c,) between points of equal arc length."""
+        distances: Array = np.linalg.norm(self.equal_mm[0] - self.equal_mm[1], axis=1)
+        return distances
 
 
 Metric = Callable[[Pair], float | bool]
@@ -114,8 +120,14 @@ def scored(arc_mm: Array, skip_mm: float) -> Array:
     return np.asarray(arc_mm[arc_mm >= min(skip_mm, max(length - SHORT_MM, 0.5 * length)) - 1e-9])
 
 
-def pair_of(simulated: Simulated, traced: Curve, lumen: Lumen, config: CompareConfig, way: Way) -> Pair:
-    """Sample both curves and measure their distances; ValueError where one of them is empty."""
+def pair_of(
+    simulated: Simulated, traced: Curve, lumen: Lumen, config: CompareConfig, way: Way, ahead_mm: float = 0.0
+) -> Pair:
+    """Sample both curves and measure their distances; ValueError where one of them is empty.
+
+    ahead_mm : how far the traced curve begins beyond the plane in which the wire does. A trace begins in the plane of
+    the manifest's entry, a wire where the clamp was found to be; arc lengths of both are counted from there.
+    """
     wire, curve = simulated.joints_mm, traced.points_mm
     if len(curve) < 2 or len(wire) < 2:
         raise ValueError(f"compare: got {len(wire)} simulated joints and {len(curve)} traced points, need 2 of each")
@@ -123,7 +135,7 @@ def pair_of(simulated: Simulated, traced: Curve, lumen: Lumen, config: CompareCo
     back = at_arc(curve, scored(samples(traced.length_mm, config.sample_mm), config.skip_mm))
     points = at_arc(wire, arc)
     error, foot = point_to_curve(points, curve)
-    common = arc[arc <= traced.length_mm + 1e-9]
+    common = arc[(arc >= ahead_mm - 1e-9) & (arc <= traced.length_mm + ahead_mm + 1e-9)]
     return Pair(
         wire,
         curve,
@@ -133,7 +145,7 @@ def pair_of(simulated: Simulated, traced: Curve, lumen: Lumen, config: CompareCo
         error,
         foot,
         back_mm=point_to_curve(back, wire)[0],
-        by_arc_mm=np.linalg.norm(at_arc(wire, common) - at_arc(curve, common), axis=1),
+        equal_mm=np.stack([at_arc(wire, common), at_arc(curve, common - ahead_mm)]),
         lumen=lumen,
         way=way,
     )
@@ -176,10 +188,9 @@ def tip_offset(pair: Pair) -> tuple[float, float]:
 
 def depth_offset(pair: Pair) -> float:
     """How much deeper the simulated wire lies along itself, mm: mean of the part along the trace at equal arc."""
-    arc = pair.arc_mm[: len(pair.by_arc_mm)]
-    if len(arc) < 2:
+    wire, curve = pair.equal_mm
+    if len(curve) < 2:
         return float("nan")
-    wire, curve = at_arc(pair.wire_mm, arc), at_arc(pair.curve_mm, arc)
     tangent = np.gradient(curve, axis=0)
     tangent /= np.maximum(np.linalg.norm(tangent, axis=1), 1e-12)[:, None]
     return float(np.mean(np.sum((wire - curve) * tangent, axis=1)))
@@ -190,10 +201,8 @@ def side_agrees(pair: Pair) -> float:
     axis = pair.way.axis_mm
     if axis is None or len(axis) < 2:
         return float("nan")
-    arc = pair.arc_mm[: len(pair.by_arc_mm)]
-    curves = [at_arc(curve, arc) for curve in (pair.wire_mm, pair.curve_mm)]
-    feet = [at_arc(axis, point_to_curve(points, axis)[1]) for points in curves]
-    first, second = (points - foot for points, foot in zip(curves, feet, strict=True))
+    feet = [at_arc(axis, point_to_curve(points, axis)[1]) for points in pair.equal_mm]
+    first, second = (points - foot for points, foot in zip(pair.equal_mm, feet, strict=True))
     known = np.minimum(np.linalg.norm(first, axis=1), np.linalg.norm(second, axis=1)) >= OFF_AXIS_MM
     return float(np.mean(np.sum(first * second, axis=1)[known] > 0)) if known.any() else float("nan")
 

@@ -1,6 +1,6 @@
 """Single-file volumes: MetaImage, NRRD and NIfTI are read here, anything else by ITK in a child process."""
 
-import re
+import stat
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -9,12 +9,18 @@ from numpy.typing import NDArray
 
 from pipeline.load import foreign, metaimage, nifti, nrrd
 from pipeline.load.config import LoadConfig
-from pipeline.load.geometry import Box, Header, Source, unusable
+from pipeline.load.geometry import Box, Header, LoadError, Source, unusable
+from pipeline.load.guard import status_of
 from pipeline.load.voxels import Head, read_box, require_data
 
 OWN = {
     ".mha": metaimage.head_of, ".mhd": metaimage.head_of, ".nrrd": nrrd.head_of, ".nhdr": nrrd.head_of,
     ".nii": nifti.head_of, ".nii.gz": nifti.head_of, ".hdr": nifti.head_of, ".img": nifti.head_of,
+}  # fmt: skip
+
+
+NAMED = {
+    ".mha": metaimage.data_files, ".mhd": metaimage.data_files, ".nrrd": nrrd.data_files, ".nhdr": nrrd.data_files,
 }  # fmt: skip
 
 
@@ -43,20 +49,12 @@ def parts(path: Path) -> tuple[Path, ...]:
     other = nifti.other_half(path)
     if other != path:
         return (other,) if other.is_file() else ()
-    if path.suffix.lower() not in {".mhd", ".mha", ".nhdr", ".nrrd"}:
+    named = NAMED.get(path.suffix.lower())
+    try:
+        states = {name: status_of(name) for name in (named(path) if named else ()) if name != path}
+    except LoadError:  # only another header can mend it
         return ()
-    with path.open("rb") as file:
-        text = file.read(65536 if path.suffix.lower() in {".mhd", ".mha"} else nrrd.LONGEST_HEADER).decode("latin-1")
-    found = re.search(r"^(?:ElementDataFile\s*=|data ?file:)[ \t]*(.*)$", text, re.IGNORECASE | re.MULTILINE)
-    if found is None or found[1].strip().upper() == "LOCAL":
-        return ()
-    name = found.group(1).strip()
-    # the names of a list follow on the next lines; a pattern such as slice_%03d.raw takes numbers
-    names = text[found.end() :].split() if name.upper().split()[:1] == ["LIST"] else [name]
-    pattern = re.sub(r"%\d*d.*", "*", name)
-    matches = path.parent.glob(pattern) if "*" in pattern and not Path(pattern).is_absolute() else ()
-    near = [path.parent / n for n in names if len(n) < 256 and "\0" not in n]
-    return tuple(sorted({p for p in (*near, *matches) if p.is_file() and p != path}))
+    return tuple(sorted(name for name, found in states.items() if found and stat.S_ISREG(found.st_mode)))
 
 
 def read_header(source: Source, config: LoadConfig) -> Header:

@@ -19,20 +19,17 @@ PLACES = ("Offset", "Position", "Origin")
 TURNS = ("TransformMatrix", "Orientation", "Rotation")
 
 
+def data_files(path: Path) -> list[Path]:
+    """The files that hold the voxels, there or not; LoadError where the header does not say which."""
+    tags, below, _ = _tags(path)
+    _, shape, items = _axes(path, tags)
+    return _files(path, tags["ElementDataFile"], below, shape[2] * items)
+
+
 def head_of(path: Path) -> Head:
     """What the header says; LoadError where that cannot be a scan."""
-    with opened(path) as file:
-        start = file.read(LONGEST_HEADER)
-    key = start.find(b"ElementDataFile")
-    end = start.find(b"\n", key)
-    if key < 0 or end < 0:
-        raise unusable(path, "cannot read it as MetaImage: no line ElementDataFile; check that the file is complete")
-    lines = start[:end].decode("latin-1").splitlines()
-    tags = {key.strip(): value.strip() for key, _, value in (line.partition("=") for line in lines)}
-    count = int(numbers(path, tags, "NDims", 1, whole=True)[0])
-    if not 1 <= count <= 8:
-        raise unusable(path, f"NDims = {count}; allowed: 3, or 4 for a sequence")
-    shape, items = axes_of(path, [int(n) for n in numbers(path, tags, "DimSize", count, whole=True)])
+    tags, below, end = _tags(path)
+    count, shape, items = _axes(path, tags)
     kind = tags.get("ElementType", "").removesuffix("_ARRAY")
     if kind not in TYPES:
         raise unusable(path, f"ElementType = {kind!r}; allowed: {', '.join(TYPES)}")
@@ -42,9 +39,9 @@ def head_of(path: Path) -> Head:
     swapped = "True" in (tags.get("BinaryDataByteOrderMSB"), tags.get("ElementByteOrderMSB"))
     stored = np.dtype((">" if swapped else "<") + TYPES[kind])
     channels = int(numbers(path, tags, "ElementNumberOfChannels", 1, whole=True, missing="1")[0])
-    files = _files(path, tags["ElementDataFile"], start[end + 1 :], shape[2] * items)
+    files = _files(path, tags["ElementDataFile"], below, shape[2] * items)
     voxel_bytes = int(np.prod(shape)) * items * channels * stored.itemsize
-    parts = tuple((name, _begin(name, path, tags, end + 1, voxel_bytes // len(files))) for name in files)
+    parts = tuple((name, _begin(name, path, tags, end, voxel_bytes // len(files))) for name in files)
     slope, shift = (
         float(numbers(path, tags, f"ElementToIntensityFunction{name}", 1, missing=text)[0])
         for name, text in (("Slope", "1"), ("Offset", "0"))
@@ -56,6 +53,38 @@ def head_of(path: Path) -> Head:
     )  # fmt: skip
 
 
+def _tags(path: Path) -> tuple[dict[str, str], str, int]:
+    """The header's tags, the text below it, and the byte at which that begins."""
+    with opened(path) as file:
+        start = file.read(LONGEST_HEADER)
+    key = start.find(b"ElementDataFile")
+    end = start.find(b"\n", key) + 1
+    if key < 0 or not end:
+        raise unusable(path, "cannot read it as MetaImage: no line ElementDataFile; check that the file is complete")
+    lines = _text(start[:end]).splitlines()
+    return (
+        {key.strip(): value.strip() for key, _, value in (line.partition("=") for line in lines)},
+        _text(start[end:]),
+        end,
+    )
+
+
+def _text(part: bytes) -> str:
+    """Names of files may be in UTF-8; what is not is read byte by byte."""
+    try:
+        return part.decode()
+    except UnicodeDecodeError:
+        return part.decode("latin-1")
+
+
+def _axes(path: Path, tags: dict[str, str]) -> tuple[int, tuple[int, int, int], int]:
+    """How many axes there are, the shape of a volume, and how many volumes."""
+    count = int(numbers(path, tags, "NDims", 1, whole=True)[0])
+    if not 1 <= count <= 8:
+        raise unusable(path, f"NDims = {count}; allowed: 3, or 4 for a sequence")
+    return count, *axes_of(path, [int(n) for n in numbers(path, tags, "DimSize", count, whole=True)])
+
+
 def _begin(name: Path, header: Path, tags: dict[str, str], end: int, voxel_bytes: int) -> int:
     """The byte of a data file where its voxels begin."""
     skipped = int(numbers(header, tags, "HeaderSize", 1, whole=True, missing="0")[0])
@@ -64,13 +93,13 @@ def _begin(name: Path, header: Path, tags: dict[str, str], end: int, voxel_bytes
     return end if name == header else max(skipped, 0)
 
 
-def _files(path: Path, text: str, below: bytes, planes: int) -> list[Path]:
+def _files(path: Path, text: str, below: str, planes: int) -> list[Path]:
     """The data files: the header's own, one, a list below it, or a pattern with its first and last number."""
     words = text.split()
     if text.upper() == "LOCAL":
         return [path]
     if words and words[0].upper() == "LIST":
-        return [beside(path, line.strip()) for line in below.decode("latin-1").splitlines() if line.strip()]
+        return [beside(path, line.strip()) for line in below.splitlines() if line.strip()]
     if "%" in text:
         return numbered(path, words, planes)
     return [beside(path, text)]

@@ -2,7 +2,7 @@
 
 import re
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,9 +33,27 @@ TO_LPS = {
 }  # fmt: skip
 
 
-def head_of(path: Path) -> Head:
-    """What the header says; LoadError where that cannot be a scan."""
-    fields, begin = _fields(path)
+def data_files(path: Path) -> list[Path]:
+    """The files that hold the voxels, there or not; LoadError where the header does not say which."""
+    fields, _ = _fields(path)
+    axes = _axes(path, fields)
+    return _files(path, fields, axes.shape[2] * axes.items)
+
+
+class Axes(NamedTuple):
+    """Of a volume and of how many; channels : values per voxel.     vectors : in space, of each axis that has one.
+
+    leading : the first axis counts the channels.
+    """
+
+    shape: tuple[int, int, int]
+    items: int
+    channels: int
+    vectors: list[Any]
+    leading: bool
+
+
+def _axes(path: Path, fields: dict[str, str]) -> Axes:
     count = int(numbers(path, fields, "dimension", 1, whole=True)[0])
     if not 1 <= count <= 8:
         raise unusable(path, f"dimension: {count}; allowed: 3, or 4 for a sequence")
@@ -44,6 +62,13 @@ def head_of(path: Path) -> Head:
     kinds = fields.get("kinds", "").lower().split() or ["domain"] * count
     leading = count == 4 and (vectors[0] is None if any(v is None for v in vectors) else kinds[0] not in DOMAINS)
     shape, items = axes_of(path, sizes[1:] if leading else sizes)
+    return Axes(shape, items, sizes[0] if leading else 1, [v for v in vectors if v is not None], leading)
+
+
+def head_of(path: Path) -> Head:
+    """What the header says; LoadError where that cannot be a scan."""
+    fields, begin = _fields(path)
+    shape, items, channels, vectors, leading = _axes(path, fields)
     kind = fields.get("type", "").lower()
     packing = PACKINGS.get(fields.get("encoding", "raw").lower())
     if kind not in TYPES or packing is None:
@@ -54,11 +79,10 @@ def head_of(path: Path) -> Head:
     stored = np.dtype((">" if fields.get("endian", "").lower() == "big" else "<") + TYPES[kind])
     if packing != "ascii" and stored.itemsize > 1 and "endian" not in fields:
         raise unusable(path, f"no endian for {stored.itemsize} bytes a voxel; allowed: little, big; correct the header")
-    channels = sizes[0] if leading else 1
-    files = _files(path, fields, begin, shape[2] * items)
+    files = _files(path, fields, shape[2] * items)
     voxel_bytes = int(np.prod(shape)) * items * channels * stored.itemsize
     parts = tuple((name, _begin(name, path, fields, begin, voxel_bytes // len(files))) for name in files)
-    geometry, assumed = _geometry(path, fields, [v for v in vectors if v is not None], int(leading))
+    geometry, assumed = _geometry(path, fields, vectors, int(leading))
     return Head(
         path, shape, stored, parts, *geometry, packing=packing, items=items, channels=channels, assumed=assumed,
         names=_segments(fields),
@@ -111,7 +135,7 @@ def _begin(name: Path, header: Path, fields: dict[str, str], begin: int, voxel_b
 MOST_LINES = 1000
 
 
-def _files(path: Path, fields: dict[str, str], begin: int, planes: int) -> list[Path]:
+def _files(path: Path, fields: dict[str, str], planes: int) -> list[Path]:
     """The data files: the header's own, one, a list below it, or a pattern with its first and last number."""
     text = fields.get("data file", "")
     if not text:

@@ -71,9 +71,14 @@ Replay = Callable[[Sequence[Clamp], Sequence[Seen], Sequence[Sequence[float]]], 
 """Called with clamps, frames and depths (clamps, frames): the wire of every frame from each clamp."""
 
 
+def ahead_of(clamp: Clamp, curve: Curve) -> float:
+    """How far beyond a clamp's plane a trace begins, mm: it does so in the plane of the manifest's entry."""
+    return float((curve.points_mm[0] - clamp.entry_mm) @ clamp.direction)
+
+
 def depth_from(clamp: Clamp, curve: Curve) -> float:
-    """Length of wire beyond a clamp, mm: the trace begins in the plane of the manifest's entry, not in the clamp's."""
-    return curve.length_mm + float((curve.points_mm[0] - clamp.entry_mm) @ clamp.direction)
+    """Length of wire beyond a clamp, mm."""
+    return curve.length_mm + ahead_of(clamp, curve)
 
 
 def axes_of(direction: Array) -> Array:

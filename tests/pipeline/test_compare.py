@@ -197,6 +197,17 @@ def test_the_tip_along_and_across_the_vessel_and_the_depth_that_is_off() -> None
     assert straight["arc_rms_mm"] ** 2 - 0.7**2 == pytest.approx(0.3**2), "what one offset leaves"
 
 
+@pytest.mark.parametrize("ahead", [0.4, -0.4])
+def test_arc_lengths_are_counted_from_the_plane_that_the_wire_is_held_in(ahead: float) -> None:
+    """A trace begins in the plane of the manifest's entry: wires that were the traces had 0.1 mm, up to 0.24."""
+    arc = np.arange(0.0, 40.0, 0.2)
+    whole = 20.0 * np.column_stack([np.sin(arc / 20.0), 1.0 - np.cos(arc / 20.0), 0.0 * arc])
+    wire, curve = (whole, whole[2:]) if ahead > 0 else (whole[2:], whole)
+    found = compare(simulated(wire), traced(curve), open_space(), ahead_mm=ahead)
+    assert [found["arc_rms_mm"], found["arc_max_mm"], found["depth_offset_mm"]] == pytest.approx([0.0] * 3, abs=1e-3)
+    assert compare(simulated(wire), traced(curve), open_space())["arc_rms_mm"] == pytest.approx(0.4, rel=0.01)
+
+
 def test_the_side_of_the_vessel_counts_where_it_is_known() -> None:
     axis = line(30.0)
     way = Way(axis, branches_of(tubes(axis).distance, axis[0]))

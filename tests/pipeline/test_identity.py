@@ -11,10 +11,11 @@ import pytest
 import SimpleITK as sitk
 
 from pipeline.cli import main
-from pipeline.load import Crop, LoadError, Source, each_volume, load, read_header, read_headers
+from pipeline.load import Crop, LoadError, Source, each_volume, load, parts_of, read_header, read_headers
 from pipeline.load.config import LoadConfig
 from pipeline.load.geometry import Mask
 from pipeline.load.order import natural_key
+from pipeline.run.hashing import file_hash
 from pipeline.run.store import digest
 from pipeline.study.infer import _deeper, _scans_in
 from pipeline.study.manifest import ManifestError, read_manifest
@@ -31,6 +32,44 @@ def test_voxels_of_a_detached_file_belong_to_the_key_of_a_crop(tmp_path: Path) -
         header = read_header(tmp_path / "a.mhd")
         keys.append(digest(Crop(header, header.box)))
     assert keys[0] != keys[1]
+
+
+NRRD = "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 2 2 2\nencoding: raw\n"
+MHD = "NDims = 3\nDimSize = 2 2 2\nElementType = MET_UCHAR\n"
+PLANES = ["s 1.raw", "s 2.raw"]
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "files"),
+    [
+        ("a.mhd", f"{MHD}ElementDataFile = größe.raw\n", ["größe.raw"]),
+        ("a.mhd", f"{MHD}ElementDataFile = LIST\ns 1.raw\ns 2.raw\n", PLANES),
+        ("a.mhd", f"{MHD}  ElementDataFile = v.raw\n", ["v.raw"]),
+        ("a.mhd", f"{MHD}ElementDataFile = s[1]_%02d.raw 1 2 1\n", ["s[1]_01.raw", "s[1]_02.raw"]),
+        ("a.mhd", f"{MHD}ElementDataFile = s_%d.raw\n", ["s_1.raw", "s_2.raw"]),
+        ("a.nhdr", f"{NRRD}data file: größe.raw\n\n", ["größe.raw"]),
+        ("a.nhdr", f"{NRRD}data file : v.raw\n\n", ["v.raw"]),
+        ("a.nhdr", f"{NRRD} data file: v.raw\n\n", ["v.raw"]),
+        ("a.nhdr", f"{NRRD}datafile: v.raw\n\n", ["v.raw"]),
+        ("a.nhdr", f"{NRRD}data file: LIST\ns 1.raw\ns 2.raw\n", PLANES),
+        ("a.nhdr", f"{NRRD}data file: other.raw\ndata file: v.raw\n\n", ["v.raw"]),
+    ],
+)
+def test_the_files_that_are_read_are_those_that_belong_to_the_key(
+    tmp_path: Path, name: str, text: str, files: list[str]
+) -> None:
+    """What one file of code read, another one looked for anew, and missed: an old result was kept for a new scan."""
+    (tmp_path / name).write_text(text, encoding="utf-8")
+    (tmp_path / "other.raw").write_bytes(b"nobody reads it")
+    for file in files:
+        (tmp_path / file).write_bytes(bytes(range(8 // len(files))))
+    header = read_header(tmp_path / name)
+    values, before = load(header, header.box).values, file_hash(tmp_path / name)
+    for file in files:
+        (tmp_path / file).write_bytes(bytes(range(9, 9 + 8 // len(files))))
+        assert file_hash(tmp_path / name) != before
+    assert np.all(load(header, header.box).values != values), "they are what was read"
+    assert sorted(parts_of(tmp_path / name)) == sorted(tmp_path / file for file in files)
 
 
 def test_datasets_labels_and_levels_belong_to_keys(tmp_path: Path) -> None:

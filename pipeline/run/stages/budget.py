@@ -30,6 +30,7 @@ from pipeline.compare.metrics import rms, scored
 from pipeline.model import Array, arc_length
 from pipeline.run.stages.known import Context, Frame, Known
 from pipeline.simulate import altered
+from pipeline.simulate.clamp import ahead_of
 from pipeline.simulate.evidence import UNKNOWN_VOXELS, Sight
 from pipeline.simulate.resolution import lengths_mm
 
@@ -135,7 +136,8 @@ class Work:
             arc = scored(samples(frame.depth_mm, settings.sample_mm), settings.skip_mm)
             return Seen(arc, at_arc(frame.simulated.joints_mm, arc))
         own = self.trace_mm(frame) ** 2 + self._segments_mm(frame) ** 2
-        return Seen(errors.arc_mm, errors.sample_mm, frame.curve.points_mm, errors.foot_arc_mm, own)
+        ahead = ahead_of(self.nominal.clamp, frame.curve)
+        return Seen(errors.arc_mm, errors.sample_mm, frame.curve.points_mm, errors.foot_arc_mm, own, ahead)
 
     def trace_mm(self, frame: Frame) -> Array:
         """Standard deviation (n,) of the trace along each axis across it, where a frame was compared."""

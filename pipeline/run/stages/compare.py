@@ -17,6 +17,7 @@ from pipeline.run.stages.known import Context, Frame, Known
 from pipeline.run.stages.own_curves import rough
 from pipeline.run.stages.rivals import rival_ways, rival_wires, simulated_rivals
 from pipeline.run.stages.views import compare_in_views
+from pipeline.simulate.clamp import ahead_of
 from pipeline.status import FrameStatus
 from solver import Solution
 
@@ -162,7 +163,8 @@ def _compared(run: Context, known: Known, frame: Frame, clues: Clues | None, see
         return frame
     assert known.lumen is not None
     settings, curve = run.config.compare, frame.curve
-    errors = compare(wire, curve, known.lumen, settings, None if clues is None else clues.way)
+    ahead = 0.0 if known.clamp is None else ahead_of(known.clamp, curve)
+    errors = compare(wire, curve, known.lumen, settings, None if clues is None else clues.way, ahead)
     if clues is None:
         return replace(frame, comparison=errors)
     nulls = score(clues, frame.depth_mm, seen, curve.points_mm, settings)
