@@ -5,6 +5,7 @@ It needs the traces of all cases, so it is computed after them and stands in ove
 
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -49,8 +50,9 @@ def _skip_mm(out: Path, case: Found) -> float:
 
 def _traces(out: Path, case: Found) -> Traces:
     """The traces of a case that are to be trusted, whatever became of the simulated wire."""
-    path = out / "cases" / case.result.case / "frames.h5"
-    kept = read_arrays(path, "traced_mm") if path.exists() else {}
+    kept: Mapping[int, Mapping[str, Array]] = {}
+    with suppress(OSError, KeyError, ValueError):  # a finished case whose ledger does not fit it counts as damaged
+        kept = read_arrays(out / "cases" / case.result.case / ledger.FRAMES, "traced_mm")
     curves = {number: arrays["traced_mm"] for number, arrays in kept.items() if len(arrays.get("traced_mm", ())) > 1}
     return {number: (depth, curves[number]) for number, depth in case.traced_mm.items() if number in curves}
 

@@ -17,9 +17,9 @@ from reports.schema import BUDGET, ENTRIES, ERRORS, POINTS, TIMINGS
 
 FILE = "ledger.json"
 RESULT, FRAMES, PROVENANCE = "result.json", "frames.h5", "provenance.json"
-TABLES = (RESULT, ERRORS.file, POINTS.file)
-"""The files that numbers over many cases are computed from."""
-DATA = (*TABLES, BUDGET.file, ENTRIES.file, TIMINGS.file, PROVENANCE, FRAMES)
+SCORED = (RESULT, ERRORS.file, POINTS.file, FRAMES)
+"""The files that numbers over many cases are computed from; traced wires are guesses of other insertions' ones."""
+DATA = (*SCORED, BUDGET.file, ENTRIES.file, TIMINGS.file, PROVENANCE)
 PAGES = ("report.html",)
 Pages = Literal["", "linked", "embedded"]
 """Which pages a case has: none, ones with links to their pictures, ones with the pictures inside."""

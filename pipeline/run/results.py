@@ -110,7 +110,7 @@ def found_results(out: Path) -> list[Result]:
 
 def _found(folder: Path) -> Result:
     path, written = folder / ledger.RESULT, ledger.read(folder)
-    wrong = written.amiss(folder, ledger.TABLES) if written else ""
+    wrong = written.amiss(folder, ledger.SCORED) if written else ""
     altered = f"{folder}: {wrong}; run the case again" * bool(wrong)
     try:
         result = read_result(path)
