@@ -182,6 +182,17 @@ def amiss(folder: Path) -> str:
     return ""
 
 
+def manifests_sentence(out_dir: Path) -> str:
+    """That the runs into a folder were of several manifests, which may state one wire otherwise; empty where of one."""
+    found = dict.fromkeys(str(run["manifest_sha256"])[:12] for run in _runs(out_dir) if "manifest_sha256" in run)
+    if len(found) < 2:
+        return ""
+    return (
+        f"the runs into this folder were of {len(found)} manifests ({', '.join(found)}): where these state wires, "
+        "walls or entries otherwise, numbers over all cases are of no one study"
+    )
+
+
 def left_out_sentence(out_dir: Path) -> str:
     """Cases without a result that no run into a folder was to compute, since ``--only`` named others."""
     names = listed([name for name, asked in _without_result(out_dir).items() if not asked])

@@ -18,6 +18,7 @@ from reports.case_files import (
     find_cases,
     left_out_sentence,
     left_over_sentence,
+    manifests_sentence,
     not_reached,
     not_run,
     not_run_sentence,
@@ -245,8 +246,9 @@ def _worse_cases(summary: pd.DataFrame, links: Mapping[str, str]) -> dict[str, A
 
 
 def _not_counted(out_dir: Path) -> dict[str, str]:
-    """Cases that no number of the page is over."""
+    """Cases that no number of the page is over, and that those which one is over may not belong together."""
     said = {"left_over": left_over_sentence, "not_run": not_run_sentence, "left_out": left_out_sentence}
+    said |= {"manifests": manifests_sentence}
     return {name: sentence(out_dir) for name, sentence in said.items()}
 
 

@@ -34,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def main(args: argparse.Namespace) -> int:
     """Exit 0 if all cases are ok, 1 if some failed or are missing (but what --only left out), 2 if there are none."""
     from pipeline.run.aggregate import aggregate
-    from pipeline.run.last_words import last_line
+    from pipeline.run.last_words import last_line, lost_lines
     from pipeline.run.results import found_results
     from pipeline.run.sweep import found_heads, lost_points, write_sweep
     from reports.html import render_index
@@ -53,7 +53,10 @@ def main(args: argparse.Namespace) -> int:
     heads = found_heads(args.out)
     if removed := write_sweep(args.out, heads):
         sys.stderr.write(f"{removed}\n")
-    totals = replace(aggregate(args.out), sweep_lost=len(lost_points(args.out, heads)))
+    lost = lost_points(args.out, heads)
+    for line in lost_lines(lost):
+        sys.stderr.write(f"{line}\n")
+    totals = replace(aggregate(args.out), sweep_lost=len(lost))
     drawn = args.overview or _all_drawn(args, found)
     page = render_index(args.out, embed=args.embed)
     others_ok = _others(args.out, embed=args.embed)
@@ -71,10 +74,16 @@ def _all_there(out: Path, found: Sequence["Result"], name: str = "") -> bool:
 
     found : results of which those that are damaged are still to be said, too.
     """
-    from reports.case_files import find_cases, left_out_sentence, left_over_sentence, not_run_sentence
+    from reports.case_files import (
+        find_cases,
+        left_out_sentence,
+        left_over_sentence,
+        manifests_sentence,
+        not_run_sentence,
+    )
 
     missing = not_run_sentence(out) or f"no case below {out}" * (not find_cases(out))
-    for aside in filter(None, (left_over_sentence(out), left_out_sentence(out), missing)):
+    for aside in filter(None, (manifests_sentence(out), left_over_sentence(out), left_out_sentence(out), missing)):
         sys.stderr.write(f"{name}{aside}\n")
     _tell([(r.case, str(r.failures[0]["message"])) for r in found if r.status == "damaged"], name)
     return not missing

@@ -1,7 +1,7 @@
 """Before a run writes into a folder: what lies there, and whether the new results may stand beside it."""
 
 import json
-from collections.abc import Container, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -45,16 +45,22 @@ def guard_out(out: Path, manifest: Path, settings: Resolved) -> None:
         raise UsageError([f"{out} was run with other settings: {others}; name another folder, or {allowed}"])
 
 
-def guard_kept(out: Path, others: Container[str], settings: Resolved) -> None:
-    """Refuse settings that differ from those of cases which this run keeps: all cases of a folder are pooled.
+def guard_kept(out: Path, others: Mapping[str, str], settings: Resolved) -> None:
+    """Refuse settings and statements that differ from those of cases which this run keeps: all of a folder are pooled.
 
-    others : ids of the manifest's cases that this run does not compute.
+    others : the manifest's cases that this run does not compute, by id what is ``stated`` of each.
     """
     with suppress(ValueError):  # an unreadable result is not pooled
         for folder in find_cases(out):
-            changed = folder.name in others and _changed(read_json(folder / "result.json"), settings)
+            if folder.name not in others:
+                continue
+            known = read_json(folder / "result.json")
+            changed = f"other settings: {said}" if (said := _changed(known, settings)) else ""
+            before, now = known.get("stated"), others[folder.name]
+            if not changed and before and now and before != now:
+                changed = "another manifest, which stated its wire, wall, entry, depths or the like otherwise"
             if changed:
-                what = f"{out}: case {folder.name!r} would keep its result of other settings: {changed}"
+                what = f"{out}: case {folder.name!r} would keep its result of {changed}"
                 raise UsageError([f"{what}; run all cases (no --only, no --shard), or name another folder"])
 
 

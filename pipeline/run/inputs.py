@@ -4,6 +4,7 @@ A scan that is replaced between reading and the end would be recorded with the h
 would be taken for that of the new file, and kept.
 """
 
+import hashlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -45,6 +46,20 @@ class Inputs:
 
 ANY = Inputs({})
 """Files that nobody watches."""
+
+
+SOURCES = {
+    *("reference", "frames", "lumen", "traces", "truth", "projections", "simulated", "parameters", "entry_case"),
+    *("calibrated_scans", "assumed"),
+}
+"""Keys that name files, whose contents count, or that are no statement."""
+
+
+def stated(case: Case) -> str:
+    """A hash of what the manifest states of a case, but for its files; empty where a calibration has replaced it."""
+    if case.calibrated:
+        return ""
+    return hashlib.sha256(case.model_dump_json(exclude=SOURCES).encode()).hexdigest()[:16]
 
 
 def described(case: Case) -> list[dict[str, Any]]:

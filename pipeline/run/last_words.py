@@ -12,10 +12,10 @@ from pipeline.run.aggregate import Totals
 from pipeline.run.launch import Plan
 from pipeline.run.overall import shared_scans
 from pipeline.run.provenance import command_line
-from pipeline.run.results import found_results
+from pipeline.run.results import Result, found_results
 from pipeline.run.sweep import heads_of, lost_points
 from reports.alike import alike
-from reports.case_files import counted, left_over_sentence
+from reports.case_files import counted, left_over_sentence, manifests_sentence
 from reports.origin import mixed_settings
 from reports.schema import SWEEP
 from reports.sweep import silent_points
@@ -33,15 +33,18 @@ def failure_lines(plan: Plan, then: str = "") -> list[str]:
     for result in found:
         cases += [row["case"] for row in result.failures]
         lines += map(_failure, alike(result.failures))
-    lines += [
-        f"{folder}: {result.case}: {result.status}: {result.failures[0]['message']}"
-        for folder, result in lost_points(plan.out, heads_of(plan.template.settings, plan.cases, plan.points))
-    ]
+    heads = heads_of(plan.template.settings, plan.cases, plan.points)
+    lines += lost_lines(lost_points(plan.out, heads, plan.ids))
     lines += silent_points(read_if_there(plan.out / SWEEP.file, SWEEP))
     then = then or _next(plan, cases)
     worse = worse_sentence([{**result.summary, "role": result.role} for result in found])
-    aside = [*filter(None, [left_over_sentence(plan.out), worse])]
+    aside = [*filter(None, [manifests_sentence(plan.out), left_over_sentence(plan.out), worse])]
     return [*aside, *lines, f"next: {then}"] if cases else [*aside, *lines]
+
+
+def lost_lines(lost: Sequence[tuple[Path, Result]]) -> list[str]:
+    """What a sweep has lost, a line each."""
+    return [f"{folder}: {result.case}: {result.status}: {result.failures[0]['message']}" for folder, result in lost]
 
 
 def _failure(row: Mapping[str, Any]) -> str:
@@ -71,7 +74,7 @@ def last_line(totals: Totals, index: Path) -> str:
     elif totals.cases_ok < totals.cases:  # one that is damaged has no frames to be counted
         parts.append(f"{totals.cases - totals.cases_ok} of the cases not ok (failures.csv)")
     if totals.sweep_lost:
-        parts.append(f"{totals.sweep_lost} crashed in the sweep")
+        parts.append(f"{counted(totals.sweep_lost, 'result')} of the sweep lost")
     if np.isfinite(totals.median_mm):
         parts.append(f"median point error {totals.median_mm:.3f} mm (p95 {totals.p95_mm:.3f})")
         low, high, said = (totals.pooled[name] for name in ("rms_low_mm", "rms_high_mm", "interval"))

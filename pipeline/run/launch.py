@@ -75,6 +75,11 @@ class Plan:
         return [replace(self.template, case=case) for case in longest]
 
     @property
+    def ids(self) -> set[str]:
+        """Of the cases to compute."""
+        return {case.id for case in self.cases}
+
+    @property
     def sweep_jobs(self) -> list[Job]:
         """The jobs of every point of the sweep; they come last, when lumen and traces are in the store.
 
@@ -149,6 +154,8 @@ def launch(plan: Plan) -> tuple[Totals, Path]:
     remove_leftovers(out)
     if plan.template.fresh:
         _remove_others(out, info["manifest_sha256"])
+    elif not plan.shard and not plan.left_out:
+        _remove_records(out, info["manifest_sha256"])
     _refuse(plan)
     run_cases(plan, [*plan.jobs, *plan.sweep_jobs])
     if removed := write_sweep(out, found_heads(out)):  # points of other shards so far included
@@ -156,7 +163,9 @@ def launch(plan: Plan) -> tuple[Totals, Path]:
     (out / "summary.pdf").unlink(missing_ok=True)  # of an earlier result
     info |= {"provenance": code_state(), "assumptions": plan.assumptions}
     Store(plan.template.cache).trim()
-    totals = replace(aggregate(out, info, name), sweep_lost=len(lost_points(out, heads)))
+    totals = replace(
+        aggregate(out, info, name), sweep_lost=len(lost_points(out, heads, {case.id for case in plan.cases}))
+    )
     return totals, render_index(out, plan.template.embed, each_on(1 if plan.address else plan.workers))
 
 
@@ -178,15 +187,20 @@ def _never_asked(info: Path, left_out: Sequence[str]) -> list[str]:
     return [name for name in left_out if name not in asked]
 
 
+def _remove_records(out: Path, manifest: str) -> None:
+    """Remove what runs of other manifests say of themselves: shards, once all cases of another one were run."""
+    for path in out.glob("run*.json"):
+        with suppress(ValueError):
+            if read_json(path).get("manifest_sha256") != manifest:
+                path.unlink()
+
+
 def _remove_others(out: Path, manifest: str) -> None:
     """Remove what runs of other manifests have left in an output folder: their records, and cases that they alone had.
 
     manifest : SHA-256 of the manifest whose runs stay.
     """
-    for path in out.glob("run*.json"):
-        with suppress(ValueError):
-            if read_json(path).get("manifest_sha256") != manifest:
-                path.unlink()
+    _remove_records(out, manifest)
     for folder in left_over(out):
         for place in (folder, *out.glob(f"sweep/*/cases/{escape(folder.name)}")):
             clear(place)

@@ -14,7 +14,7 @@ from pipeline.load import Scans
 from pipeline.register.frames import record
 from pipeline.run import ledger
 from pipeline.run.calibrated import data_of
-from pipeline.run.inputs import described
+from pipeline.run.inputs import described, stated
 from pipeline.run.log import Log
 from pipeline.run.occupied import owner_of
 from pipeline.run.outputs import failure_rows, message_of
@@ -30,6 +30,9 @@ LOST = {
     "crashed": "the case ended in an unexpected error; its log has the traceback",
     "worker_lost": "the worker process was killed, twice; its log tells where it was",
     "scheduler_lost": "the dask scheduler went away while the case ran or waited; give the same command again",
+    "missing": "the case has a plain result and none here; give the command with --sweep again",
+    "outdated": "the result is of other files, or of another manifest, than the plain one; give the command with "
+    "--sweep again",
     "over_limit": "the case took more time or memory than it may; raise --case-timeout or --case-memory",
     "refused": "the case was left out, as its files cannot be used; mend what the message names, then run it",
     "removed": "the case's result was removed while the run went on; give the same command again",
@@ -62,8 +65,8 @@ class Result:
     frames : status, sentence, stage and message of each.     failures, summary : rows of those tables.
     key : of everything that the result depends on; empty where it is to be computed again.     phantom : of what the
     vessel was taken from, the same for insertions into the same; empty where the frames alone show it.     scans :
-    of the contents of each frame or trace, and of the voxels of each frame.     details :
-    settings, inputs, counters, assumptions and what else the pages show.
+    of the contents of each frame or trace, and of the voxels of each frame.     stated : see ``inputs.stated``.
+    details : settings, inputs, counters, assumptions and what else the pages show.
     """
 
     case: str
@@ -77,12 +80,18 @@ class Result:
     key: str = ""
     phantom: str = ""
     scans: tuple[str, ...] = ()
+    stated: str = ""
     details: dict[str, Any] = field(default_factory=dict)
 
     @property
     def ok(self) -> bool:
         """Whether every frame is ok, or simulated where there is nothing to compare with."""
         return self.status in GOOD
+
+    def same_inputs(self, other: "Result") -> bool:
+        """Whether both are of one case as it was stated, with the same vessel and scans, as far as they tell."""
+        told = ((self.stated, other.stated), (self.phantom, other.phantom), (self.scans, other.scans))
+        return all(a == b for a, b in told if a and b)
 
     @property
     def frame_count(self) -> int:
@@ -146,7 +155,7 @@ def result_of(case: Case, known: Known, summary: dict[str, Any], key: str, detai
     source = case.lumen or case.reference
     phantom = "" if source is None else digest(source)
     scans = (*data_of(case), *(frame.voxels for frame in known.frames if frame.voxels))
-    return Result(*head, frames, failure_rows(case.id, known), summary, key, phantom, scans, details)
+    return Result(*head, frames, failure_rows(case.id, known), summary, key, phantom, scans, stated(case), details)
 
 
 def untold(name: str) -> Result:

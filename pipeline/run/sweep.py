@@ -4,7 +4,7 @@ Segmentation and tracing do not depend on the solver's settings, so the stage st
 simulation and comparison only. An agreement that no parameter moves is suspicious.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -12,16 +12,17 @@ from typing import Any
 from pipeline.compare import intervals
 from pipeline.run.another import with_another
 from pipeline.run.overall import Found, found_cases, overall, ratio, skill_beside
-from pipeline.run.results import LOST, Result
+from pipeline.run.results import LOST, Result, found_results, lost
 from pipeline.study.manifest import Case
 from pipeline.study.settings import Resolved, Setting, SettingsError, parse_assignment, resolve
 from reports import tables
-from reports.case_files import find_cases, read_json
+from reports.case_files import listed, read_json
 from reports.origin import mixed_settings
 from reports.schema import SWEEP
 
 PLAIN = "(plain)"
 """Stands where the name of the changed setting would."""
+AGAIN = "give the command with --sweep again"
 
 
 @dataclass(frozen=True)
@@ -55,14 +56,17 @@ def _folder(head: Head) -> Path:
 
 def points_of(texts: Sequence[str], base: Sequence[Setting]) -> list[SweepPoint]:
     """``table.key=v1,v2`` texts as points; raises SettingsError for an unknown setting or value."""
-    points = []
+    points: list[SweepPoint] = []
     for text in texts:
         name, equals, values = text.partition("=")
         if not equals or not values.strip():
             raise SettingsError([f"--sweep {text!r}: write table.key=value1,value2"])
         for value in values.split(","):
             setting = parse_assignment(f"{name}={value}", "sweep")
-            points.append(SweepPoint(name.strip(), value.strip(), resolve([*base, setting])))
+            point = SweepPoint(name.strip(), value.strip(), resolve([*base, setting]))
+            # 0.1 and 0.10 are one point
+            if not any(p.parameter == point.parameter and p.settings.config == point.settings.config for p in points):
+                points.append(point)
     return points
 
 
@@ -83,22 +87,52 @@ def found_heads(out: Path) -> list[Head]:
     return list(found.values())
 
 
-def _at(out: Path, head: Head) -> list[Found]:
-    """Those cases at a sweep point that the plain run has, too."""
-    named = {folder.name for folder in find_cases(out)}
-    return [case for case in found_cases(out / _folder(head)) if case.result.case in named]
+def asked_of(out: Path, head: Head) -> set[str]:
+    """The cases for which the runs into an output folder were to compute a point."""
+    found: set[str] = set()
+    for run in map(read_json, out.glob("run*.json")):
+        if any(_folder(head) == _folder(one) for one in run.get("sweep", ())):
+            found |= set(run.get("planned", ())) - set(run.get("left_out", ()))
+    return found
 
 
-def lost_points(out: Path, heads: Sequence[Head]) -> list[tuple[Path, Result]]:
-    """Cases that a sweep has lost (crashed, killed, damaged), each with the folder of its point."""
-    return [(_folder(h), case.result) for h in heads for case in _at(out, h) if case.result.status in LOST]
+def _at(out: Path, head: Head, plain: Sequence[Found]) -> list[Found]:
+    """Those cases at a sweep point that the plain run has, too, of the same inputs."""
+    known = {case.result.case: case.result for case in plain}
+    found = [case for case in found_cases(out / _folder(head)) if case.result.case in known]
+    return [case for case in found if case.result.same_inputs(known[case.result.case])]
+
+
+def lost_points(out: Path, heads: Sequence[Head], cases: Container[str] | None = None) -> list[tuple[Path, Result]]:
+    """Results that a sweep has lost (crashed, killed, damaged, missing, of other inputs), each with its point's folder.
+
+    cases : those that are asked for at each point; None: those that the runs into the folder were to compute.
+    """
+    plain, lost_ones = found_results(out), list[tuple[Path, Result]]()
+    for head in heads:
+        folder, asked = _folder(head), asked_of(out, head) if cases is None else cases
+        there = {result.case: result for result in found_results(out / folder)}
+        lost_ones += [(folder, one) for case in plain if (one := _amiss(out / folder, case, there, asked))]
+    return lost_ones
+
+
+def _amiss(place: Path, plain: Result, there: Mapping[str, Result], asked: Container[str]) -> Result | None:
+    """What is to be said of a case at a point; None where it has its result, or none was asked for."""
+    found = there.get(plain.case)
+    if found is None:
+        why = f"{place}: no result of this case; {AGAIN}"
+        return lost(plain.case, "missing", why) if plain.case in asked else None
+    if found.status in LOST:
+        return found
+    why = f"{place}: the case's files, or what the manifest states of it, are not those of the plain result; {AGAIN}"
+    return None if found.same_inputs(plain) else lost(plain.case, "outdated", why)
 
 
 def write_sweep(out: Path, heads: Sequence[Head]) -> str:
     """Write sweep.csv: the plain result first, then every point, each of them case by case and over all of them.
 
     It is removed where cases were run with different settings, or where the runs name no points: an older table belongs
-    to an older result. Returns a sentence where one was removed.
+    to an older result. Returns a sentence where one was removed, or earlier points are left out.
     """
     if not heads or mixed_settings(out):
         there = (out / SWEEP.file).exists()
@@ -109,9 +143,10 @@ def write_sweep(out: Path, heads: Sequence[Head]) -> str:
     null = str(overall(before).get("strongest_null") or "")
     rows = list(_rows({"parameter": PLAIN, "value": ""}, before, before, null))
     for head in heads:
-        rows += _rows(head, before, _at(out, head), null)
+        rows += _rows(head, before, _at(out, head, before), null)
     tables.write(out / SWEEP.file, SWEEP, rows)
-    return ""
+    others = listed(sorted({path.name for path in out.glob("sweep/*")} - {_folder(head).name for head in heads}))
+    return f"{out / SWEEP.file}: without points of an earlier run, which are kept: {others}; {AGAIN}" * bool(others)
 
 
 def unchanged(plain: Resolved, cases: Sequence[Case], parameter: str) -> str:

@@ -17,6 +17,7 @@ import pandas as pd
 import pytest
 
 from pipeline.cli import main
+from pipeline.run import ledger
 from pipeline.run.another import with_another
 from pipeline.run.overall import found_cases
 
@@ -112,6 +113,52 @@ def test_another_insertion_counts_from_where_the_simulated_wire_does(out: Path, 
         for number, frame in case.frames.items():
             points = [sum(n for _, n in f.guesses.values()) for f in (frame, usual[case.result.case][number])]
             assert points[0] > points[1]
+
+
+def test_a_point_of_a_sweep_that_is_missing_or_of_other_inputs_is_lost(
+    out: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Other scans' results stood beside the new ones in sweep.csv, ratio 1.09; whole folders were not missed."""
+    folder = shutil.copytree(out, tmp_path / "whole")
+    missing, outdated = (f"sweep/{name}={value}" for name, value in WRONG.items())
+    shutil.rmtree(folder / missing / "cases" / "bend-2")
+    case = folder / outdated / "cases" / "bend"
+    result = json.loads((case / "result.json").read_text(encoding="utf-8"))
+    plain = json.loads((folder / "cases" / "bend" / "result.json").read_text(encoding="utf-8"))
+    assert all(result[key] == plain[key] for key in ("stated", "phantom", "scans"))
+    (case / "result.json").write_text(json.dumps(result | {"stated": "otherwise"}), encoding="utf-8")
+    ledger.write(case, result["key"])
+    capsys.readouterr()
+    assert main(["report", str(folder), "--overview"]) == 1
+    said = capsys.readouterr()
+    assert f"{missing}: bend-2: missing: {folder / missing}: no result of this case" in said.err
+    assert f"{outdated}: bend: outdated: {folder / outdated}: the case's files, or what the manifest" in said.err
+    assert "2 results of the sweep lost" in said.out
+    rows = pd.read_csv(folder / "sweep.csv").groupby("parameter")["case"].agg(set)
+    assert "bend" not in rows[outdated.removeprefix("sweep/").partition("=")[0]]
+    shutil.rmtree(folder / "sweep")
+    assert main(["report", str(folder), "--overview"]) == 1
+    assert f"{2 * INSERTIONS} results of the sweep lost" in capsys.readouterr().out
+
+
+def test_a_part_of_the_cases_is_not_run_from_another_manifest(
+    study: Path, out: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A case of a wire ten times as stiff was pooled with those of the old one, without a word."""
+    folder, other = shutil.copytree(out, tmp_path / "out"), shutil.copytree(study, tmp_path / "study")
+    text = (other / "manifest.toml").read_text(encoding="utf-8")
+    (other / "manifest.toml").write_text(text.replace("radius_mm = 0.18", "radius_mm = 0.17"), encoding="utf-8")
+    words = ["run", str(other), "-o", str(folder), "--until", "compare", "--only", "bend"]
+    for more in ("--resume", "--fresh"):
+        assert main([*words, more]) == 2
+        assert "case 'bend-2' would keep its result of another manifest" in capsys.readouterr().err
+    assert main(["run", str(study), *words[2:], "--resume"]) == 0, "the same manifest elsewhere"
+    told = json.loads((folder / "run.json").read_text(encoding="utf-8"))
+    (folder / "run.1-2.json").write_text(json.dumps(told | {"manifest_sha256": "another"}), encoding="utf-8")
+    capsys.readouterr()
+    main(["report", str(folder), "--overview"])
+    assert "the runs into this folder were of 2 manifests" in capsys.readouterr().err
+    assert "The runs into this folder were of 2 manifests" in (folder / "index.html").read_text(encoding="utf-8")
 
 
 def test_a_trace_of_another_depth_is_no_guess(out: Path) -> None:

@@ -655,7 +655,7 @@ def test_a_crash_in_a_sweep_is_said_and_counted(
     assert run(study, tmp_path / "out", "--sweep", "simulate.wall_scale=2", *UNTIL) == 1
     said = capsys.readouterr()
     assert "simulate.wall_scale=2: bifurcation: crashed: RuntimeError: burst pipe" in said.err
-    assert "1 crashed in the sweep" in said.out
+    assert "1 result of the sweep lost" in said.out
 
 
 def test_pages_of_many_cases_are_drawn_with_a_line_each(
