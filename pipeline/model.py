@@ -161,6 +161,7 @@ class Lumen:
     """The vessel: ``distance`` is the signed distance to its wall in mm on the vessel's own box, negative inside.
 
     wall_level : the grey value taken as the wall; NaN where the lumen did not come from grey values.
+    of_scan : by which the scan that it came from is known again, whatever file holds it; empty without one.
     """
 
     distance: Grid
@@ -168,6 +169,7 @@ class Lumen:
     warnings: tuple[str, ...] = ()
     counters: Counters = field(default_factory=dict)
     levels: Levels = field(default_factory=dict)
+    of_scan: str = ""
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 
 from pipeline.run.another import with_another
-from pipeline.run.overall import found_cases, frames_of, overall, shared_scans, validation
+from pipeline.run.overall import found_cases, frames_of, overall, shared_scans, strangers, validation
 from pipeline.run.results import Result, write_json
 from reports import tables
 from reports.case_files import GOOD, not_reached
@@ -67,7 +67,7 @@ def aggregate(out: Path, run_info: dict[str, Any] | None = None, name: str = "ru
         tables.write(out / file, table, known)
     tables.write(out / TIMINGS.file, TIMINGS, times)
     if run_info is not None:
-        assumed = [*run_info.get("assumptions", ()), *shared_scans(found)]
+        assumed = [*run_info.get("assumptions", ()), *shared_scans(found), *strangers(found)]
         cases_of = {"assumptions": assumed, "cases": [result.case for result in found]}
         write_json(out / name, run_info | cases_of | {"overall": whole})
     pooled = [] if mixed else frames_of(validation(cases))

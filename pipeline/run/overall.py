@@ -76,6 +76,19 @@ def shared_scans(results: Sequence[Result]) -> list[str]:
     ]
 
 
+def strangers(results: Sequence[Result]) -> list[str]:
+    """That no insertion is known to be into the phantom of another, where there are several; else nothing."""
+    judged = [result for result in results if result.role != "calibration" and result.status != "simulated"]
+    insertions = insertions_of(judged)
+    pairs = {(result.phantom, insertions[result.case]) for result in judged if result.phantom}
+    if len(set(insertions.values())) < 2 or len({phantom for phantom, _ in pairs}) < len(pairs):
+        return []
+    return [
+        "no two insertions have one lumen, or a reference of the same voxels, so that none is a guess for another; "
+        'name the phantom in the cases into the same one, as phantom = "A"'
+    ]
+
+
 def damaged(found: Sequence[Found]) -> dict[str, str]:
     """The damaged cases, each with the message that says which file is wrong and why."""
     return {c.result.case: str(c.result.failures[0]["message"]) for c in found if c.result.status == "damaged"}

@@ -63,10 +63,9 @@ class Result:
     """A case as result.json holds it.
 
     frames : status, sentence, stage and message of each.     failures, summary : rows of those tables.
-    key : of everything that the result depends on; empty where it is to be computed again.     phantom : of what the
-    vessel was taken from, the same for insertions into the same; empty where the frames alone show it.     scans :
-    of the contents of each frame or trace, and of the voxels of each frame.     stated : see ``inputs.stated``.
-    details : settings, inputs, counters, assumptions and what else the pages show.
+    key : of everything that the result depends on; empty where it is to be computed again.     phantom, stated : see
+    ``phantom_of``, ``inputs.stated``.     scans : of the contents of each frame or trace, and of the voxels of each
+    frame.     details : settings, inputs, counters, assumptions and what else the pages show.
     """
 
     case: str
@@ -140,6 +139,18 @@ def _found(folder: Path) -> Result:
     return result
 
 
+def phantom_of(case: Case, known: Known) -> str:
+    """What other insertions into the same vessel have, too: as stated, their lumen, or the voxels of their reference.
+
+    Empty where the vessel was segmented from a scan with the wire in it.
+    """
+    if case.phantom:
+        return f"stated: {case.phantom}"
+    if case.lumen is not None:
+        return digest(case.lumen)
+    return known.lumen.of_scan if case.reference is not None and known.lumen is not None else ""
+
+
 def result_of(case: Case, known: Known, summary: dict[str, Any], key: str, details: dict[str, Any]) -> Result:
     """The result of a case that went through the stages."""
     frames = [
@@ -152,10 +163,10 @@ def result_of(case: Case, known: Known, summary: dict[str, Any], key: str, detai
     worst = next((f.sentence for f in known.frames if not f.ok), good)
     sentence = str(known.failure) if known.failure else worst
     head = (case.id, case.role, case.group, summary["status"], sentence)
-    source = case.lumen or case.reference
-    phantom = "" if source is None else digest(source)
     scans = (*data_of(case), *(frame.voxels for frame in known.frames if frame.voxels))
-    return Result(*head, frames, failure_rows(case.id, known), summary, key, phantom, scans, stated(case), details)
+    return Result(
+        *head, frames, failure_rows(case.id, known), summary, key, phantom_of(case, known), scans, stated(case), details
+    )
 
 
 def untold(name: str) -> Result:

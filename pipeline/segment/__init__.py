@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pipeline.arrays.cores import side_by_side
+from pipeline.arrays.fingerprint import known_with_place
 from pipeline.arrays.grids import in_memory_order, reorder
 from pipeline.model import Lumen, Volume
 from pipeline.segment import bone, uneven
@@ -101,4 +102,5 @@ def segment(
         {**region.counters, **wall.counters, "touching_places": float(len(open_ones))},
         {"noise": region.levels.noise, "wall_noise_mm": wall.noise_mm, "blur_mm": wall.blur_mm,
          "scanner_blur_mm": blur, "least_filling": found.least},
+        known_with_place(volume),
     )  # fmt: skip

@@ -74,6 +74,7 @@ class Case(Strict):
     role: Literal["validation", "calibration"] = "validation"
     assumed: tuple[Annotated[str, Field(min_length=1, max_length=1000)], ...] = ()
     group: str = Field(default_factory=lambda data: data.get("id", ""), min_length=1, max_length=200)
+    phantom: str = Field("", max_length=200)
     reference: SourceText | None = None
     frames: Sources = ()
     entry_mm: Point

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from pipeline.arrays.fingerprint import known_by
 from pipeline.arrays.grids import towards_lps
 from pipeline.model import Volume
-from pipeline.run.stages.repeated import known_by
 
 OBLIQUE = Rotation.from_rotvec([0.1, 0.2, -0.15]).as_matrix()
 

@@ -32,6 +32,8 @@ KEYS = {
     "role": "What the case is for: a calibration case counts in no score.",
     "assumed": "What nobody has confirmed yet, a sentence each; `init` writes them, `check` and the pages repeat them.",
     "group": "Insertions of one group are one unit of the intervals. Default: the case itself.",
+    "phantom": "A name: insertions into one phantom, in the same coordinates, are guesses for each other "
+    "(null_another_rms_mm). Default: what has the same lumen, or a reference of the same voxels in the same place.",
     "reference": "Scan without the wire. Without it the lumen is segmented from the first frame.",
     "frames": "With the wire: a pattern in natural order, or a list; files, DICOM folders, `study.h5#/frames`.",
     "entry_mm": "Where the wire enters the lumen, LPS mm.",

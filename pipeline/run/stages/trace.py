@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from pipeline.arrays.fingerprint import known_by
 from pipeline.arrays.grids import corners_mm
 from pipeline.load import Crop, Header
 from pipeline.model import Curve, Volume
@@ -21,7 +22,7 @@ from pipeline.run.stages.dim_ends import own_dim_ends
 from pipeline.run.stages.gaps import own_gaps
 from pipeline.run.stages.known import Context, Frame, Known
 from pipeline.run.stages.own_curves import RESAMPLE, as_given, given_curves, rough
-from pipeline.run.stages.repeated import known_by, once
+from pipeline.run.stages.repeated import once
 from pipeline.run.stages.thickness import too_thin
 from pipeline.run.stages.wire_free import wire_in_reference
 from pipeline.run.straightened import straightened
