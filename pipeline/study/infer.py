@@ -19,6 +19,8 @@ from pipeline.model import Array, Volume, Wall
 REFERENCE_NAMES = ("reference", "ref", "wire_free", "nowire", "empty")
 DEFAULT_RADIUS_MM = 0.18
 AT_EDGE = "the end of the wire nearest to the edge of the first frame"
+IN_PLACE = "the end of the wire in the first frame that is where it was in the last"
+NOWHERE = np.zeros((0, 3))
 UNSUBTRACTED = (
     "; without a reference to subtract the brightest thing there may be a filled vessel or a bone: such a guess is "
     "several mm off, look at the first frame and correct both, or scan the phantom without the wire"
@@ -118,36 +120,53 @@ def _wire_voxels(frame: Volume, reference: Volume | None) -> Array:
     return np.argwhere(labels == 1 + int(sizes.argmax())).astype(float)
 
 
-def infer_entry(frame: Volume, reference: Volume | None, file: Path) -> tuple[Array, Array]:
-    """Entry (LPS mm) and direction: the wire's end nearest to the edge of the scan, and where it points from there.
+def infer_entry(frame: Volume, reference: Volume | None, file: Path, last: Array = NOWHERE) -> tuple[Array, Array, str]:
+    """Entry (LPS mm), direction, and in words which end of the wire that is: where it begins, and points from there.
 
-    Raises LoadError, naming the frame's file, where no bright, connected structure is found.
+    last : points (n, 3) of the wire in the last frame: its beginning stays in place. Where that does not tell the ends
+    apart, the one nearest to the edge of the scan. Raises LoadError, naming the frame's file, where no bright,
+    connected structure is found.
     """
     voxels = _wire_voxels(frame, reference)
     if len(voxels) < 5:
         why = "no wire is visible in it, the first frame, so the entry cannot be inferred"
         do = "give --entry and --direction, or take the file out of the folder where it is no frame"
         raise unusable(file, f"{why}; {do}")
+    points, reach = frame.to_mm(voxels), 4.0 * float(frame.spacing_mm.max()) + 2.0
     edge = np.minimum(voxels, np.array(frame.shape) - 1 - voxels).min(axis=1)
-    points = frame.to_mm(voxels)
-    entry = points[np.argmin(edge)]
-    distance = np.linalg.norm(points - entry, axis=1)
-    reach = 4.0 * float(frame.spacing_mm.max()) + 2.0
-    near = points[distance < reach]
+    entry, which = points[np.argmin(edge)], AT_EDGE
+    if len(last):
+        off = np.linalg.norm(_ends(points)[:, None] - _ends(last), axis=2).min(axis=1)
+        if off.min() < 0.5 * reach < off.max() - off.min():
+            entry, which = _ends(points)[np.argmin(off)], IN_PLACE
+    near = points[np.linalg.norm(points - entry, axis=1) < reach]
     axis = np.linalg.svd(near - near.mean(axis=0))[2][0]
-    return entry, np.asarray(axis * np.sign((near.mean(axis=0) - entry) @ axis))
+    return entry, np.asarray(axis * np.sign((near.mean(axis=0) - entry) @ axis)), which
+
+
+def _ends(points: Array) -> Array:
+    """The two points (2, 3) of (n, 3) that lie farthest apart, as nearly as two looks find them."""
+    first = points[np.argmax(np.linalg.norm(points - points.mean(axis=0), axis=1))]
+    return np.stack([first, points[np.argmax(np.linalg.norm(points - first, axis=1))]])
 
 
 def _stated_or_seen(
-    entry: Array | None, direction: Array | None, frame: Path, reference: Path | None, config: LoadConfig
+    entry: Array | None, direction: Array | None, frames: Sequence[Path], reference: Path | None, config: LoadConfig
 ) -> tuple[Array, Array, str]:
-    """Entry and direction, each as the first frame shows it where it is not stated; a sentence on what is not."""
+    """Entry and direction, each as the frames show it where it is not stated; a sentence on what is not."""
     if entry is not None and direction is not None:
         return entry, direction, ""
-    empty = load(read_header(reference, config), config=config) if reference else None
-    at, towards = infer_entry(load(read_header(frame, config), config=config), empty, frame)
+
+    def loaded(path: Path) -> Volume:
+        return load(read_header(path, config), config=config)
+
+    empty, last = loaded(reference) if reference else None, NOWHERE
+    if empty is not None and len(frames) > 1:
+        final = loaded(frames[-1])
+        last = final.to_mm(_wire_voxels(final, empty))
+    at, towards, which = infer_entry(loaded(frames[0]), empty, frames[0], last)
     guessed = " and ".join(name for name, of in (("entry_mm", entry), ("entry_direction", direction)) if of is None)
-    where = f"{guessed}: {AT_EDGE}{'' if reference else UNSUBTRACTED}"
+    where = f"{guessed}: {which}{'' if reference else UNSUBTRACTED}"
     return at if entry is None else entry, towards if direction is None else direction, where
 
 
@@ -175,7 +194,7 @@ def infer_manifest(
         f"reference: {reference.name}" if reference else "reference: none found (a file named reference.*)",
         *(f"left out: {path.name}, named as a scan without wire" for path in left_out),
     )
-    entry, direction, where = _stated_or_seen(entry, direction, frames[0], reference, config)
+    entry, direction, where = _stated_or_seen(entry, direction, frames, reference, config)
     notes = _assumed(radius_mm, [where] * bool(where) + [SEED] * (reference is None))
     text = MANIFEST.format(
         radius=radius_mm or DEFAULT_RADIUS_MM,

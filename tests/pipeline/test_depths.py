@@ -9,7 +9,7 @@ import pytest
 
 from pipeline.model import Curve
 from pipeline.run.log import Log
-from pipeline.run.stages.depths import in_step, shrinking, turned_round
+from pipeline.run.stages.depths import in_step, shrinking, standing, turned_round
 from pipeline.run.stages.dim_ends import own_dim_ends
 from pipeline.run.stages.known import Frame
 from pipeline.run.stages.repeated import once
@@ -50,6 +50,16 @@ def test_a_scale_that_is_off_or_read_by_hand_is_no_fault() -> None:
 def test_too_few_frames_or_no_depths_say_nothing() -> None:
     assert all(f.ok for f in in_step(frames([10.0, 12.0, 18.0], DEPTHS[:3]), 0.3))
     assert all(f.ok for f in in_step(frames([10.0, 12.0, 11.0, 12.0], [float("nan")] * 4), 0.3))
+
+
+def test_a_wire_that_does_not_advance_is_a_warning() -> None:
+    """From an entry inside the wire, backwards, two of four traces of 5 mm were ok, and nobody asked."""
+    nan = [float("nan")] * 3
+    assert "the traced wire is 5.0 mm long in all 3 frames" in standing(frames([5.0, 5.2, 4.9], nan), 0.3)[0]
+    assert standing(frames([5.0, 5.2, 6.9], nan), 0.3) == []
+    assert standing(frames([5.0, 5.2, 4.9], [5.0] * 3), 0.3) == []
+    rolled = [replace(f, roll_deg=30.0 * f.index) for f in frames([5.0, 5.2, 4.9], nan)]
+    assert standing(rolled, 0.3) == []
 
 
 def test_a_wire_that_gets_shorter_unsaid_is_a_warning() -> None:

@@ -15,9 +15,10 @@ from pipeline.load import Crop, LoadError, Source, each_volume, load, parts_of, 
 from pipeline.load.config import LoadConfig
 from pipeline.load.geometry import Mask
 from pipeline.load.order import natural_key
+from pipeline.model import Volume
 from pipeline.run.hashing import file_hash
 from pipeline.run.store import digest
-from pipeline.study.infer import _deeper, _scans_in
+from pipeline.study.infer import AT_EDGE, IN_PLACE, _deeper, _scans_in, infer_entry
 from pipeline.study.manifest import ManifestError, read_manifest
 from tests.pipeline.test_load import SPACING, image_of, numbered
 from tests.pipeline.test_manifest import GOOD
@@ -216,3 +217,20 @@ def test_scans_further_down_are_named(tmp_path: Path, monkeypatch: pytest.Monkey
     assert f"up into {tmp_path.name}/frames" in said
     monkeypatch.chdir(tmp_path)
     assert f"up into {tmp_path.name}/frames" in _deeper(Path()), "it was /frames, of the disk"
+
+
+def test_the_wire_begins_where_it_stays_in_place() -> None:
+    """A tip nearer to the edge of the scan than the entry was taken for it, and all traces ran backwards."""
+
+    def scan(last: int) -> Volume:
+        values = np.zeros((20, 30, 40), np.int16)
+        values[2 + np.arange(last) // 3, 15, 5 + np.arange(last)] = 1000  # sideways, towards the edge
+        return Volume(values[::-1], np.ones(3), np.zeros(3))
+
+    first, final = scan(16), scan(30)
+    last = final.to_mm(np.argwhere(final.values > 0))
+    entry, direction, which = infer_entry(first, None, Path("f.mha"), last)
+    assert (entry.tolist(), which) == ([17.0, 15.0, 5.0], IN_PLACE)
+    assert direction[2] > 0.9
+    for told in (np.zeros((0, 3)), first.to_mm(np.argwhere(first.values > 0))):  # one frame, or all of one depth
+        assert infer_entry(first, None, Path("f.mha"), told)[2] == AT_EDGE

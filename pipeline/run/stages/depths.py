@@ -76,3 +76,15 @@ def shrinking(frames: Sequence[Frame], voxel_mm: float) -> list[str]:
         f"frames {', '.join(odd)}: the traced wire is shorter than in the frame before, allowed where it was pulled "
         "back; look at the picture whether the trace is cut short, or state insertion_mm"
     ]
+
+
+def standing(frames: Sequence[Frame], voxel_mm: float) -> list[str]:
+    """A warning where no depths are stated and the wire is as long in all frames, though nothing else differs."""
+    seen = [(f.roll_deg, c.length_mm) for f in frames if (c := f.trusted_curve) is not None and np.isnan(f.expected_mm)]
+    rolls, lengths = {roll for roll, _ in seen}, [length for _, length in seen]
+    if len(seen) < FEWEST - 1 or len(rolls) > 1 or np.ptp(lengths) > LEAST_VOXELS * voxel_mm:
+        return []
+    return [
+        f"the traced wire is {np.median(lengths):.1f} mm long in all {len(seen)} frames with a trace: it did not "
+        "advance, or entry_mm lies inside it, or entry_direction points the way that it came from; look at the picture"
+    ]
