@@ -24,7 +24,7 @@ from pipeline.streams import lasting
 
 J = TypeVar("J")
 R = TypeVar("R")
-PRELOADED = "pipeline.run.case"
+FIRST, PRELOADED = "pipeline.run.with_parent", "pipeline.run.case"
 """Imported once (1.5 s) by the server that workers are forked from."""
 LOOK_S = 0.1
 """Seconds between checks of a worker against its limits: for that long it may exceed them."""
@@ -141,7 +141,7 @@ def _start_server() -> None:
     before = {name: os.environ.get(name) for name in THREADS}
     one_thread()
     try:
-        multiprocessing.get_context("forkserver").set_forkserver_preload([PRELOADED])
+        multiprocessing.get_context("forkserver").set_forkserver_preload([FIRST, PRELOADED])
         resource_tracker.ensure_running()  # it lets signals through again
         with _interrupts_wait():
             forkserver.ensure_running()

@@ -99,6 +99,32 @@ def test_no_worker_outlives_its_parent(tmp_path: Path, how: signal.Signals) -> N
     wait_for(lambda: not any(running(n) for n in numbers))
 
 
+SLOW = """
+import os, sys, time
+from pathlib import Path
+Path(__file__).with_name("server.tmp").write_text(str(os.getpid()))
+Path(__file__).with_name("server.tmp").rename(Path(__file__).with_name("server"))
+time.sleep(300)
+"""
+
+
+@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGINT])
+def test_the_server_of_the_workers_does_not_either_while_it_imports(tmp_path: Path, how: signal.Signals) -> None:
+    """It went on for seven seconds."""
+    (tmp_path / "slow.py").write_text(SLOW, encoding="utf-8")
+    script = tmp_path / "parent.py"
+    script.write_text(PARENT.replace('"time"', '"slow"'), encoding="utf-8")
+    path = {"PYTHONPATH": f"{tmp_path}{os.pathsep}{Path(__file__).parents[2]}"}
+    with subprocess.Popen(
+        [sys.executable, str(script), str(tmp_path)], stderr=subprocess.DEVNULL, env=os.environ | path
+    ) as parent:
+        wait_for((tmp_path / "server").exists)
+        server = int((tmp_path / "server").read_text(encoding="utf-8"))
+        assert running(server)
+        parent.send_signal(how)
+    wait_for(lambda: not running(server))
+
+
 def with_root() -> dict[str, str]:
     return os.environ | {"PYTHONPATH": str(Path(__file__).parents[2])}
 
