@@ -69,6 +69,9 @@ def _refuse(case: str, place: Path, why: str) -> list[str]:
     raise UsageError([f"case {case!r}: --curves {place}: {why}; {do}"])
 
 
+NO_NAMES = ("nan", "na", "n.a", "null", "none")
+
+
 def named(texts: Sequence[str]) -> dict[str, Path]:
     """``NAME=PLACE`` texts by name; one without a name is called as its folder is. Raises UsageError."""
     found: dict[str, Path] = {}
@@ -77,6 +80,10 @@ def named(texts: Sequence[str]) -> dict[str, Path]:
         name = name if equals else Path(place).absolute().stem
         if not name.replace("-", "").replace("_", "").replace(".", "").isalnum() or name.lower() == "wireval":
             raise UsageError([f"--curves {text!r}: the name {name!r}: letters, digits, - . _, and not 'wireval'"])
+        if name.lower() in NO_NAMES:
+            raise UsageError(
+                [f"--curves {text!r}: tables are often read so that {name!r} is no value; name it otherwise"]
+            )
         if not place:
             raise UsageError([f"--curves {text!r}: no place after the name; write NAME=DIR"])
         if name.lower() in map(str.lower, found):  # they name folders, which some disks do not tell apart
