@@ -18,7 +18,7 @@ The paper is Alderliesten, Konings & Niessen, MICCAI 2002; equation numbers are 
 | k, d            | VesselWall.stiffness_N_mm2 (per mm of wire); State.penetration      | N/mm²; mm  | 6             |
 | U_Tvw           | Solution.wall_energy_N_mm                                           | N mm       | 7             |
 | U_Tb            | Solution.bending_energy_N_mm                                        | N mm       | 2             |
-| hull points     | VesselWall.hull: "samples:N", or their smooth limit "offset"        | -          | section 2.1   |
+| hull points     | VesselWall.hull: "samples:N", or the deepest one alone, "offset"    | -          | section 2.1   |
 | ξ_i, α_i        | the trial state of ``closed_form.propose``                          | mm         | 8, 9          |
 | a_i, ψ_i        | ``closed_form.gradients`` (numerator, denominator)                  | rad        | 10, corrected |
 | P, Q, S axes    | Solution.frames: columns are material axes 1, 2 and the direction   | -          | 11            |

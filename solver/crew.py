@@ -118,8 +118,9 @@ def _solutions(plan: Plan, w: int, work: Workspace) -> list[Solution]:
     found = []
     for n, (*notes, (outcome, iterations, k), row) in enumerate(noted):
         # copies: the next wire's results overwrite these
-        arrays = [a[w, row : row + k + 1].copy() for a in (plan.x, plan.r, plan.force)]
         depth, roll, *_ = notes[0]
+        x, r, force = (a[w, row : row + k + 1] for a in (plan.x, plan.r, plan.force))
+        arrays = [x.copy(), work.rolled(r, roll), force.copy()]
         ended = Status[data.OUTCOMES[outcome]], iterations, depth, roll, work.wire.radius_mm
         found.append(Solution.assembled(arrays, tuple(notes), plan.snaps[w, n], ended))
         if work.at_entry is not None:

@@ -109,7 +109,9 @@ class VesselWall:
     """The lumen's wall as a signed distance in mm, negative inside; its law is in ``_kernels.wall_law``.
 
     stiffness_N_mm2 : k, in N/mm per mm of wire.     friction : Coulomb's coefficient, 0 costs nothing.
-    hull : "offset" (the smooth limit d = max(0, φ + radius)) or "samples:N" (N points around each joint).
+    hull : "offset" (d = max(0, φ + radius), the deepest point of the round hull) or "samples:N" (the mean of N points
+    around each joint). A wall of the same k is softer with samples, the more so the shallower it is pressed in: of
+    many points few lie deepest.
     Beyond the grid the distance continues linearly. Raises ValueError for NaN or inf in the grid; warns where it
     is no distance in mm by its slope at the wall.
     """
@@ -165,7 +167,7 @@ class VesselWall:
 
     @cached_property
     def samples(self) -> int:
-        """Number of hull points around a joint; 0 is the smooth limit."""
+        """Number of hull points around a joint; 0 is the smooth hull."""
         if isinstance(self.hull, str) and self.hull == "offset":
             return 0
         name, _, count = self.hull.partition(":") if isinstance(self.hull, str) else ("", "", "")

@@ -46,7 +46,7 @@ class GuideWire:
 
     segment_mm : length of a segment.     radius_mm : radius of the outer hull.
     bending_stiffness_N_mm2, rest_curvature_per_mm : a number, rows [distance from tip, value] (linear between,
-    constant beyond, two equal distances make a jump), or a callable of an array of distances.
+    constant beyond, two equal distances make a jump), or a callable of an array of distances (up to 2000 mm).
     torsional_stiffness_N_mm2 : inf is ideal torque control (the paper's assumption).
     weight_N_per_mm : weight in blood, buoyancy subtracted (7e-6 for 0.36 mm of steel); 0 leaves gravity out.
     Positive rest curvature bends the wire towards material axis 1.

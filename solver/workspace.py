@@ -248,11 +248,14 @@ class Workspace:
         outcome, iterations, self.k = advance(self.handle, depth_mm, roll_deg, laid)
         return Status[data.OUTCOMES[outcome]], iterations
 
-    def _rolled(self, frames: Array) -> Array:
-        """A copy of the frames (n, 3, 3); where a roll moved nothing, and so was not carried out, turned by it."""
-        if self.introducer is None or not self.introducer.idle_roll:
+    def rolled(self, frames: Array, roll_deg: float) -> Array:
+        """A copy of the frames (n, 3, 3); where a roll moved nothing, and so was not carried out, turned by it.
+
+        That is one of a straight wire, or at depth 0.
+        """
+        if self.introducer is None or not (self.introducer.idle_roll or len(frames) == 1):
             return frames.copy()
-        angle = math.radians(float(self.place["roll"][0]))
+        angle = math.radians(roll_deg)
         one, two, _ = self.introducer.frame.T
         first = math.cos(angle) * one + math.sin(angle) * two
         c, d = float(frames[0, :, 0] @ first), float(frames[0, :, 1] @ first)
@@ -263,7 +266,11 @@ class Workspace:
     def solution(self, status: Status, iterations: int, depth_mm: float, roll_deg: float) -> Solution:
         """The wire as it lies now."""
         n, state = self.k + 1, self.problem.state
-        arrays = [state.x[CURRENT, :n].copy(), self._rolled(state.r[CURRENT, :n]), self.force[:n].copy()]
+        arrays = [
+            state.x[CURRENT, :n].copy(),
+            self.rolled(state.r[CURRENT, :n], float(self.place["roll"][0])),
+            self.force[:n].copy(),
+        ]
         notes = self.place.item(0), self.report.item(0), state.energies.item(CURRENT), self.counters.item(0)
         ended = status, iterations, depth_mm, roll_deg, self.wire.radius_mm
         solution = Solution.assembled(arrays, notes, self.snaps, ended)

@@ -32,7 +32,7 @@ class SolverConfig:
     segment_mm: Segment = "auto"
     """Length of the wire's rigid segments; auto halves it until that changes nothing."""
     hull: Annotated[str, Field(pattern=rf"^(offset|samples:{SAMPLES})$", json_schema_extra=HULLS)] = "offset"
-    """offset (the smooth limit) or samples:N."""
+    """offset (the hull's deepest point) or samples:N (the mean of N points, a softer wall for the same stiffness)."""
     tolerance: Annotated[float, Field(gt=0, lt=1), Number] = 1e-9
     """Newton decrement, relative to the energy, at which a step counts as converged."""
     max_iterations: PositiveCount = 200

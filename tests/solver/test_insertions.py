@@ -116,6 +116,22 @@ def test_back_again_rolled_and_to_no_depth_at_all() -> None:
     both(wires_in_the_bend, depths, rolls)
 
 
+def test_a_roll_that_moves_nothing_turns_the_frames_all_the_same() -> None:
+    """A straight wire rolled in place, which takes no step; and a curved one at depth 0."""
+
+    def made() -> list[Insertion]:
+        wall = wires_in_the_bend()[0].wall
+        wires = [GuideWire(1.0, 0.18, 1.0, rest) for rest in (0.0, 0.0, 0.01)]
+        return [Insertion(wire, wall, [0, 0, 0], [0, 0, 1], material_axis=[1, 0, 0]) for wire in wires]
+
+    rolls = [30.0, 60.0, 90.0, 120.0]
+    found = both(made, [[3.0, 3.0, 3.0, 4.0], [0.0, 0.0, 2.0, 2.0], [0.0, 0.0, 2.0, 2.0]], [rolls] * 3)
+    for solution, roll in zip(found[0] + found[1], rolls * 2, strict=True):
+        turned = np.degrees(np.arctan2(solution.frames[-1, 1, 0], solution.frames[-1, 0, 0]))
+        assert turned == pytest.approx(roll, abs=1e-3)
+    assert np.degrees(np.arccos(found[2][1].frames[0, 0, 0])) == pytest.approx(60.0)
+
+
 def test_a_way_may_be_gone_in_parts_and_alone_in_between() -> None:
     insertions, whole = wires_in_the_bend(), wires_in_the_bend()
     many = Insertions(insertions, threads=1)
