@@ -184,11 +184,10 @@ def _to_score(args: argparse.Namespace, manifest: "Manifest") -> "tuple[Manifest
 def _guard(args: argparse.Namespace, manifest: "Manifest", computed: "Set[str]", settings: "Resolved") -> None:
     """Refuse to write into an OUT that holds what the cases to be computed may not stand beside."""
     from pipeline.run.guards import guard_kept, guard_out, guard_stages
-    from pipeline.run.inputs import stated
 
     if not (args.resume or args.fresh):
         guard_out(args.out, manifest.path, settings)
-    guard_kept(args.out, {case.id: stated(case) for case in manifest.cases if case.id not in computed}, settings)
+    guard_kept(args.out, {case.id: case for case in manifest.cases if case.id not in computed}, settings)
     if not args.fresh:
         guard_stages(args.out, args.until)
 

@@ -46,6 +46,8 @@ def _inside(group: h5py.Group, name: str, source: Source) -> Any:
         if isinstance(link, h5py.ExternalLink):
             raise unusable(source, "a link into another file; allowed: data in this file; copy them into it")
     node = group.get(name)
+    if node is not None and Path(node.file.filename) != Path(group.file.filename):  # through a soft link
+        raise unusable(source, "a link into another file; allowed: data in this file; copy them into it")
     if isinstance(node, h5py.Dataset) and (node.external or node.is_virtual):
         raise unusable(source, "its data lie in other files; allowed: data in this file; copy them into it")
     return node

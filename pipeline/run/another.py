@@ -4,6 +4,7 @@ It needs the traces of all cases, so it is computed after them and stands in ove
 """
 
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -17,7 +18,7 @@ from pipeline.compare.metrics import point_to_curve, scored
 from pipeline.compare.nulls import ANOTHER
 from pipeline.model import Array
 from pipeline.run import ledger
-from pipeline.run.overall import Found
+from pipeline.run.overall import Found, phantoms_of
 from reports.case_files import read_json
 from reports.frames_file import read_arrays
 
@@ -35,11 +36,16 @@ Traces = Mapping[int, tuple[float, Array]]
 
 def with_another(out: Path, found: Sequence[Found]) -> list[Found]:
     """The cases, with the predictor's error added to the frames' rows where other insertions share the phantom."""
-    phantoms = [case.result.phantom for case in found]
-    shared = [case for case in found if case.result.phantom and phantoms.count(case.result.phantom) > 1]
+    phantoms = phantoms_of(case.result for case in found)
+    count = Counter(phantoms.values())
+    shared = [case for case in found if count[phantoms.get(case.result.case, "")] > 1]
     traces = {case.result.case: _traces(out, case) for case in shared}
     skip_mm = _skip_mm(out, shared[0]) if shared else 0.0
-    return [_with_another(case, shared, traces, skip_mm) if case in shared else case for case in found]
+    kin: dict[str, list[Found]] = {}
+    for case in shared:
+        kin.setdefault(phantoms[case.result.case], []).append(case)
+    own = {case.result.case: kin[phantoms[case.result.case]] for case in shared}
+    return [_with_another(c, own[c.result.case], traces, skip_mm) if c.result.case in own else c for c in found]
 
 
 def _skip_mm(out: Path, case: Found) -> float:
@@ -58,9 +64,11 @@ def _traces(out: Path, case: Found) -> Traces:
 
 
 def _with_another(case: Found, shared: Sequence[Found], traces: Mapping[str, Traces], skip_mm: float) -> Found:
-    """The case, with the RMS distance of other insertions' nearest traces to the frame's own trace in each row."""
-    phantom = [c for c in shared if c.result.phantom == case.result.phantom]
-    kin = [(c.insertion, traces[c.result.case]) for c in phantom if c.insertion != case.insertion]
+    """The case, with the RMS distance of other insertions' nearest traces to the frame's own trace in each row.
+
+    shared : the cases of its phantom.
+    """
+    kin = [(c.insertion, traces[c.result.case]) for c in shared if c.insertion != case.insertion]
     own, frames = traces[case.result.case], dict(case.frames)
     others = Others(kin, own)
     for number in frames.keys() & own:

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from pipeline.run.hashing import file_hash
+from pipeline.run.inputs import stated
 from pipeline.study.manifest import Case
 from pipeline.study.parameters import Parameters, ParametersError, read_parameters, with_parameters
 
@@ -36,6 +37,7 @@ def as_calibrated(
                 read[path] = read_parameters(path)
             found = read[path]
             changed = _with_clamp(case, with_parameters(case, found, data_of(case), score_used=own), found)
+            changed = changed.model_copy(update={"as_stated": stated(case)})
         except ParametersError as error:
             problems += [text for text in error.problems if text not in problems]
             continue

@@ -7,9 +7,11 @@ from pathlib import Path
 from typing import Any
 
 from pipeline.run.hashing import file_hash
+from pipeline.run.inputs import other_file, stated
 from pipeline.run.log import STAGES, Stage
 from pipeline.run.results import jsonable
 from pipeline.status import UsageError
+from pipeline.study.manifest import Case
 from pipeline.study.settings import Resolved
 from reports.case_files import find_cases, read_json
 from reports.origin import ABSENT, settings_of
@@ -45,23 +47,29 @@ def guard_out(out: Path, manifest: Path, settings: Resolved) -> None:
         raise UsageError([f"{out} was run with other settings: {others}; name another folder, or {allowed}"])
 
 
-def guard_kept(out: Path, others: Mapping[str, str], settings: Resolved) -> None:
-    """Refuse settings and statements that differ from those of cases which this run keeps: all of a folder are pooled.
+def guard_kept(out: Path, others: Mapping[str, Case], settings: Resolved) -> None:
+    """Refuse what differs from that of cases which this run keeps, settings or their inputs: all of them are pooled.
 
-    others : the manifest's cases that this run does not compute, by id what is ``stated`` of each.
+    others : the manifest's cases that this run does not compute, by id.
     """
     with suppress(ValueError):  # an unreadable result is not pooled
         for folder in find_cases(out):
             if folder.name not in others:
                 continue
-            known = read_json(folder / "result.json")
-            changed = f"other settings: {said}" if (said := _changed(known, settings)) else ""
-            before, now = known.get("stated"), others[folder.name]
-            if not changed and before and now and before != now:
-                changed = "another manifest, which stated its wire, wall, entry, depths or the like otherwise"
+            changed = _otherwise(read_json(folder / "result.json"), others[folder.name], settings)
             if changed:
                 what = f"{out}: case {folder.name!r} would keep its result of {changed}"
                 raise UsageError([f"{what}; run all cases (no --only, no --shard), or name another folder"])
+
+
+def _otherwise(known: Mapping[str, Any], case: Case, settings: Resolved) -> str:
+    """What of a kept result is not as it would be now, in words; empty where nothing is."""
+    if changed := _changed(known, settings):
+        return f"other settings: {changed}"
+    if known.get("stated") not in (None, "", stated(case)):
+        return "another manifest, which stated it otherwise"
+    file = other_file(case, known["inputs"]) if "inputs" in known else ""
+    return f"another file: {file}" if file else ""
 
 
 def _changed(known: Mapping[str, Any], settings: Resolved) -> str:

@@ -5,7 +5,7 @@ would be taken for that of the new file, and kept.
 """
 
 import hashlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -48,18 +48,43 @@ ANY = Inputs({})
 """Files that nobody watches."""
 
 
-SOURCES = {
+UNSTATED = {
     *("reference", "frames", "lumen", "traces", "truth", "projections", "simulated", "parameters", "entry_case"),
-    *("calibrated_scans", "assumed"),
+    *("calibrated", "calibrated_scans", "own_parameters", "as_stated", "assumed"),
 }
-"""Keys that name files, whose contents count, or that are no statement."""
+"""Keys that name files, whose contents count, and what is no statement of the manifest."""
+SMALL_BYTES = 2**20
+"""A file up to this is hashed where only a larger one's size is asked for."""
 
 
 def stated(case: Case) -> str:
-    """A hash of what the manifest states of a case, but for its files; empty where a calibration has replaced it."""
-    if case.calibrated:
-        return ""
-    return hashlib.sha256(case.model_dump_json(exclude=SOURCES).encode()).hexdigest()[:16]
+    """A hash of what the manifest states of a case, but for its files, whatever a calibration has made of it."""
+    if case.as_stated:
+        return case.as_stated
+    other = stated(case.entry_case) if case.entry_case is not None else ""
+    return hashlib.sha256(f"{case.model_dump_json(exclude=UNSTATED)}{other}".encode()).hexdigest()[:16]
+
+
+def contents_of(case: Case) -> str:
+    """A hash of the contents of a case's files, by their keys."""
+    rows = sorted((str(row["key"]), str(row["sha256"])) for row in described(case))
+    return hashlib.sha256(repr(rows).encode()).hexdigest()[:16]
+
+
+def other_file(case: Case, known: Sequence[Mapping[str, Any]]) -> str:
+    """Which file of a case is not the one that ``known`` describes, its key and path; empty where all are.
+
+    A large file in the same place, of the same size, is taken for the same; elsewhere it is hashed.
+    """
+    rows = {str(row.get("key")): row for row in known}
+    for key, path in _named(case).items():
+        if not path.exists():
+            continue
+        row, size = rows.get(key, {}), _size(path)
+        here = row.get("path") == str(path) and row.get("bytes") == size and size > SMALL_BYTES
+        if not here and row.get("sha256") != file_hash(path):
+            return f"{key}, now {path}"
+    return ""
 
 
 def described(case: Case) -> list[dict[str, Any]]:

@@ -142,7 +142,8 @@ def launch(plan: Plan) -> tuple[Totals, Path]:
     out, settings, manifest = plan.out, plan.template.settings, plan.manifest.path
     info: dict[str, Any] = {"manifest": str(manifest), "manifest_sha256": file_hash(manifest)}
     heads = heads_of(settings, plan.cases, plan.points)
-    info |= {"sweep": heads, "until": plan.template.until, "planned": [case.id for case in plan.manifest.cases]}
+    info |= {"sweep": heads, "swept": sorted(plan.ids) if heads else [], "until": plan.template.until}
+    info |= {"planned": [case.id for case in plan.manifest.cases]}
     name = f"run.{plan.shard.replace('/', '-')}.json" if plan.shard else "run.json"
     info |= {"left_out": _never_asked(out / name, plan.left_out), "config": settings.as_dict()}
     try:

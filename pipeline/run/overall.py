@@ -52,15 +52,31 @@ def golden_cases(out: Path) -> list[Found]:
 
 def insertions_of(results: Iterable[Result]) -> dict[str, str]:
     """The insertion of each case: its group, else itself; cases that share a scan are one, whatever they state."""
-    found: dict[str, str] = {}
-    seen: dict[str, str] = {}
-    for result in results:
-        mine = found[result.case] = result.group or result.case
-        for scan in result.scans:
-            other = found[seen.setdefault(scan, result.case)]
-            found = {case: other if name == mine else name for case, name in found.items()} if other != mine else found
-            mine = other
-    return found
+    return _joined([(result.case, result.group or result.case, result.scans) for result in results])
+
+
+def phantoms_of(results: Iterable[Result]) -> dict[str, str]:
+    """The phantom of each case that has one, called after a case: the same file, voxels or stated name."""
+    return _joined([(result.case, result.case, result.vessel) for result in results if result.vessel])
+
+
+def _joined(cases: Sequence[tuple[str, str, Iterable[str]]]) -> dict[str, str]:
+    """A label for each case, one for all that have something in common, be it through others.
+
+    cases : each with a label of its own and what it may have in common with others.
+    """
+    above: dict[str, str] = {}
+    first: dict[str, str] = {}
+
+    def top(label: str) -> str:
+        while above.setdefault(label, label) != label:
+            label = above[label]
+        return label
+
+    for _, own, tokens in cases:
+        for token in tokens:
+            above[top(own)] = top(first.setdefault(token, own))
+    return {case: top(own) for case, own, _ in cases}
 
 
 def shared_scans(results: Sequence[Result]) -> list[str]:
@@ -79,8 +95,8 @@ def shared_scans(results: Sequence[Result]) -> list[str]:
 def strangers(results: Sequence[Result]) -> list[str]:
     """That no insertion is known to be into the phantom of another, where there are several; else nothing."""
     judged = [result for result in results if result.role != "calibration" and result.status != "simulated"]
-    insertions = insertions_of(judged)
-    pairs = {(result.phantom, insertions[result.case]) for result in judged if result.phantom}
+    insertions, phantoms = insertions_of(judged), phantoms_of(judged)
+    pairs = {(phantom, insertions[case]) for case, phantom in phantoms.items()}
     if len(set(insertions.values())) < 2 or len({phantom for phantom, _ in pairs}) < len(pairs):
         return []
     return [

@@ -14,7 +14,7 @@ from pipeline.load import Scans
 from pipeline.register.frames import record
 from pipeline.run import ledger
 from pipeline.run.calibrated import data_of
-from pipeline.run.inputs import described, stated
+from pipeline.run.inputs import contents_of, described, stated
 from pipeline.run.log import Log
 from pipeline.run.occupied import owner_of
 from pipeline.run.outputs import failure_rows, message_of
@@ -63,9 +63,10 @@ class Result:
     """A case as result.json holds it.
 
     frames : status, sentence, stage and message of each.     failures, summary : rows of those tables.
-    key : of everything that the result depends on; empty where it is to be computed again.     phantom, stated : see
-    ``phantom_of``, ``inputs.stated``.     scans : of the contents of each frame or trace, and of the voxels of each
-    frame.     details : settings, inputs, counters, assumptions and what else the pages show.
+    key : of everything that the result depends on; empty where it is to be computed again.     phantom : of the file
+    that the vessel was taken from, empty without one.     scans : of the contents of each frame or trace, and of the
+    voxels of each frame.     names : of the phantom, see ``names_of``.     stated, contents : see ``inputs``.
+    details : settings, inputs, counters, assumptions and what else the pages show.
     """
 
     case: str
@@ -79,7 +80,9 @@ class Result:
     key: str = ""
     phantom: str = ""
     scans: tuple[str, ...] = ()
+    names: tuple[str, ...] = ()
     stated: str = ""
+    contents: str = ""
     details: dict[str, Any] = field(default_factory=dict)
 
     @property
@@ -87,9 +90,14 @@ class Result:
         """Whether every frame is ok, or simulated where there is nothing to compare with."""
         return self.status in GOOD
 
+    @property
+    def vessel(self) -> set[str]:
+        """Insertions into one phantom have some of these in common."""
+        return {self.phantom, *self.names} - {""}
+
     def same_inputs(self, other: "Result") -> bool:
-        """Whether both are of one case as it was stated, with the same vessel and scans, as far as they tell."""
-        told = ((self.stated, other.stated), (self.phantom, other.phantom), (self.scans, other.scans))
+        """Whether both are of one case as it was stated, with the same files, as far as they tell."""
+        told = ((self.stated, other.stated), (self.contents, other.contents))
         return all(a == b for a, b in told if a and b)
 
     @property
@@ -139,16 +147,14 @@ def _found(folder: Path) -> Result:
     return result
 
 
-def phantom_of(case: Case, known: Known) -> str:
-    """What other insertions into the same vessel have, too: as stated, their lumen, or the voxels of their reference.
+def names_of(case: Case, known: Known) -> tuple[str, ...]:
+    """What tells a vessel beside its file: its stated name, and the voxels of the reference, whatever file holds them.
 
-    Empty where the vessel was segmented from a scan with the wire in it.
+    Nothing of the latter where the vessel was segmented from a scan with the wire in it.
     """
-    if case.phantom:
-        return f"stated: {case.phantom}"
-    if case.lumen is not None:
-        return digest(case.lumen)
-    return known.lumen.of_scan if case.reference is not None and known.lumen is not None else ""
+    from_reference = case.lumen is None and case.reference is not None and known.lumen is not None
+    seen = [known.lumen.of_scan] if from_reference and known.lumen is not None else []
+    return (*[f"stated: {case.phantom}"] * bool(case.phantom), *seen)
 
 
 def result_of(case: Case, known: Known, summary: dict[str, Any], key: str, details: dict[str, Any]) -> Result:
@@ -164,9 +170,10 @@ def result_of(case: Case, known: Known, summary: dict[str, Any], key: str, detai
     sentence = str(known.failure) if known.failure else worst
     head = (case.id, case.role, case.group, summary["status"], sentence)
     scans = (*data_of(case), *(frame.voxels for frame in known.frames if frame.voxels))
-    return Result(
-        *head, frames, failure_rows(case.id, known), summary, key, phantom_of(case, known), scans, stated(case), details
-    )
+    source = case.lumen or case.reference
+    phantom = "" if source is None else digest(source)
+    inputs = scans, names_of(case, known), stated(case), contents_of(case)
+    return Result(*head, frames, failure_rows(case.id, known), summary, key, phantom, *inputs, details)
 
 
 def untold(name: str) -> Result:

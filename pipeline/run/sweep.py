@@ -92,7 +92,7 @@ def asked_of(out: Path, head: Head) -> set[str]:
     found: set[str] = set()
     for run in map(read_json, out.glob("run*.json")):
         if any(_folder(head) == _folder(one) for one in run.get("sweep", ())):
-            found |= set(run.get("planned", ())) - set(run.get("left_out", ()))
+            found |= set(run.get("swept", ()))
     return found
 
 

@@ -92,6 +92,7 @@ class Case(Strict):
     traces: Sources = ()
     parameters: PathText | None = None
     calibrated: Annotated[str, *FILLED_IN] = ""
+    as_stated: Annotated[str, *FILLED_IN] = ""
     own_parameters: Annotated[str, *FILLED_IN] = ""
     calibrated_scans: Annotated[tuple[str, ...], *FILLED_IN] = ()
     roll_deg: Finite | PerFrame | Literal["fit"] = 0.0

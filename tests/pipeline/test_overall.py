@@ -248,5 +248,5 @@ def test_the_last_words_name_a_case_that_is_worse_than_a_guess(tmp_path: Path) -
     for name, skill in (("a", 0.9), ("b", -0.6)):
         row = {"case": name, "status": "ok", "frames": 1, "frames_ok": 1, "rms_mm": GOOD}
         write_case(tmp_path, name, [GOOD], summary=row | {"skill_strongest": skill, "strongest_null": "previous"})
-    plan = SimpleNamespace(out=tmp_path, template=SimpleNamespace(settings=None), cases=(), points=())
+    plan = SimpleNamespace(out=tmp_path, template=SimpleNamespace(settings=None), cases=(), points=(), ids=set())
     assert failure_lines(cast(Plan, plan), "-") == ["1 of 2 cases is worse than a guess: b."]

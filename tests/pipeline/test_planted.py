@@ -20,7 +20,7 @@ import SimpleITK as sitk
 from pipeline.cli import main
 from pipeline.run import ledger
 from pipeline.run.another import with_another
-from pipeline.run.overall import found_cases, strangers
+from pipeline.run.overall import found_cases, phantoms_of, strangers
 
 INSERTIONS, FRAMES = 3, 4
 WRONG = {"simulate.roll_offset_deg": "180", "simulate.rest_curvature_scale": "0"}
@@ -99,12 +99,17 @@ def test_a_reference_in_another_format_is_of_the_same_phantom(
     text = (folder / "manifest.toml").read_text(encoding="utf-8")
     first, second = text.split('id = "bend-2"')
     second = second.replace('reference = "1/reference.mha"', 'reference = "other.nrrd"', 1)
-    for name, change, phantoms in (("other", "", 1), ("stated", 'phantom = "A"\n', 2)):
-        (folder / "manifest.toml").write_text(f'{first}id = "bend-2"\n{change}{second.lstrip()}', encoding="utf-8")
-        main(["run", str(folder), "-o", str(tmp_path / name), "--until", "compare", "-q"])
-        found = found_cases(tmp_path / name)
-        assert len({case.result.phantom for case in found}) == phantoms
-        assert bool(strangers([case.result for case in found[:2]])) == (name == "stated")
+    text = f'{first}id = "bend-2"\nphantom = "A"\n{second.lstrip()}'  # a name takes nothing away
+    (folder / "manifest.toml").write_text(text, encoding="utf-8")
+    main(["run", str(folder), "-o", str(tmp_path / "other"), "--until", "compare", "-q"])
+    results = [case.result for case in found_cases(tmp_path / "other")]
+    assert len({result.phantom for result in results}) == 2, "files"
+    assert set(phantoms_of(results).values()) == {"bend"}
+    assert not strangers(results)
+    apart = [replace(result, phantom=result.case, names=()) for result in results]
+    assert "no two insertions have one lumen" in strangers(apart)[0]
+    named = [replace(result, names=("stated: A",)) for result in apart[1:]]
+    assert phantoms_of([apart[0], *named]) == {"bend": "bend", "bend-2": "bend-2", "bend-3": "bend-2"}
     before, after = (pd.read_csv(f / "overall.csv").loc[0, "null_another_rms_mm"] for f in (out, tmp_path / "other"))
     assert after == pytest.approx(before, rel=0.05), "traces differ a little where voxels lie in another order"
 
@@ -147,7 +152,7 @@ def test_a_point_of_a_sweep_that_is_missing_or_of_other_inputs_is_lost(
     case = folder / outdated / "cases" / "bend"
     result = json.loads((case / "result.json").read_text(encoding="utf-8"))
     plain = json.loads((folder / "cases" / "bend" / "result.json").read_text(encoding="utf-8"))
-    assert all(result[key] == plain[key] for key in ("stated", "phantom", "scans"))
+    assert all(result[key] == plain[key] for key in ("stated", "contents"))
     (case / "result.json").write_text(json.dumps(result | {"stated": "otherwise"}), encoding="utf-8")
     ledger.write(case, result["key"])
     capsys.readouterr()
@@ -161,6 +166,10 @@ def test_a_point_of_a_sweep_that_is_missing_or_of_other_inputs_is_lost(
     shutil.rmtree(folder / "sweep")
     assert main(["report", str(folder), "--overview"]) == 1
     assert f"{2 * INSERTIONS} results of the sweep lost" in capsys.readouterr().out
+    told = json.loads((folder / "run.json").read_text(encoding="utf-8"))
+    (folder / "run.json").write_text(json.dumps(told | {"swept": ["bend"]}), encoding="utf-8")
+    assert main(["report", str(folder), "--overview"]) == 1
+    assert "2 results of the sweep lost" in capsys.readouterr().out, "of the others none was asked for"
 
 
 def test_a_part_of_the_cases_is_not_run_from_another_manifest(
@@ -174,6 +183,11 @@ def test_a_part_of_the_cases_is_not_run_from_another_manifest(
     for more in ("--resume", "--fresh"):
         assert main([*words, more]) == 2
         assert "case 'bend-2' would keep its result of another manifest" in capsys.readouterr().err
+    # other files for the case that is kept; and the case whose clamp another one borrows
+    swapped = text.replace('"2/frames/', '"3/frames/')
+    (other / "manifest.toml").write_text(swapped, encoding="utf-8")
+    assert main([*words, "--resume"]) == 2
+    assert "case 'bend-2' would keep its result of another file: frames" in capsys.readouterr().err
     assert main(["run", str(study), *words[2:], "--resume"]) == 0, "the same manifest elsewhere"
     told = json.loads((folder / "run.json").read_text(encoding="utf-8"))
     (folder / "run.1-2.json").write_text(json.dumps(told | {"manifest_sha256": "another"}), encoding="utf-8")

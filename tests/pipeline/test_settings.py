@@ -92,7 +92,9 @@ def test_what_has_no_known_content_is_refused_in_a_key() -> None:
 
 def test_the_voxels_behind_a_header_belong_to_its_content(tmp_path: Path) -> None:
     header, voxels = tmp_path / "scan.mhd", tmp_path / "scan.raw"
-    header.write_text("ObjectType = Image\nElementDataFile = scan.raw\n", encoding="utf-8")
+    header.write_text(
+        "NDims = 3\nDimSize = 1 1 5\nElementType = MET_UCHAR\nElementDataFile = scan.raw\n", encoding="utf-8"
+    )
     voxels.write_bytes(b"first")
     first = file_hash(header)
     voxels.write_bytes(b"other")

@@ -404,6 +404,7 @@ def hdf5_variants() -> Iterator[Variant]:
     yield Variant("h5, group out of order", grouped, values=numbered() + 2, item=2)
     yield Variant("h5, group of two geometries", lambda f: grouped(f, shift=1.0), "!geometry differs")
     yield Variant("h5, a link into another file", linked, "!another file")
+    yield Variant("h5, a link to a link into another file", linked_twice, "!another file")
 
 
 def grouped(folder: Path, shift: float = 0.0) -> Source:
@@ -418,6 +419,14 @@ def linked(folder: Path) -> Source:
     hdf5()(folder)
     with h5py.File(folder / "t.h5", "w") as file:
         file["volume"] = h5py.ExternalLink("s.h5", "/volume")
+    return Source(folder / "t.h5", "/volume")
+
+
+def linked_twice(folder: Path) -> Source:
+    hdf5()(folder)
+    with h5py.File(folder / "t.h5", "w") as file:
+        file["away"] = h5py.ExternalLink("s.h5", "/volume")
+        file["volume"] = h5py.SoftLink("/away")
     return Source(folder / "t.h5", "/volume")
 
 
