@@ -37,7 +37,6 @@ def as_calibrated(
                 read[path] = read_parameters(path)
             found = read[path]
             changed = _with_clamp(case, with_parameters(case, found, data_of(case), score_used=own), found)
-            changed = changed.model_copy(update={"as_stated": stated(case)})
         except ParametersError as error:
             problems += [text for text in error.problems if text not in problems]
             continue
@@ -61,7 +60,7 @@ def as_calibrated(
 
 def _with_clamp(case: Case, changed: Case, found: Parameters) -> Case:
     """The case, and the one whose clamp it borrows, both with the parameters."""
-    other = case.entry_case
-    if other is None or other.wire.name != found.wire:
-        return changed
-    return changed.model_copy(update={"entry_case": with_parameters(other, found, ())})
+    other, update = case.entry_case, dict[str, object](as_stated=stated(case))
+    if other is not None and other.wire.name == found.wire:
+        update["entry_case"] = with_parameters(other, found, ())
+    return changed.model_copy(update=update)

@@ -27,6 +27,7 @@ from pipeline.run.cache import Store
 from pipeline.run.calibrated import as_calibrated, data_of
 from pipeline.run.calibration import gathered, over_insertions
 from pipeline.run.calibration_files import flattened, misfit
+from pipeline.run.inputs import described, other_file, stated
 from pipeline.run.log import Log
 from pipeline.run.outputs import error_row, summary_row
 from pipeline.run.stages import Context, Known
@@ -256,6 +257,23 @@ def test_a_friction_that_was_not_seen_stays_as_the_case_states_it(study):
     (case,), _ = as_calibrated(read_manifest(manifest).cases, file)
     assert case.wall.friction == 0.3
     assert "not seen there, as stated: friction" in case.calibrated
+
+
+def test_a_kept_case_is_asked_for_what_is_stated_behind_its_parameters_and_for_these(study):
+    """Results of a wall, or of parameters, that had been changed since were kept beside new ones, without a word."""
+    manifest = study / "manifest.toml"
+    text = manifest.read_text(encoding="utf-8").replace('id = "b"', 'id = "b"\nparameters = "p.toml"')
+    manifest.write_text(text, encoding="utf-8")
+    (_, case) = read_manifest(manifest).cases
+    (made,), _ = as_calibrated([case], None)
+    assert made.wire != case.wire
+    assert stated(made) == stated(case)
+    manifest.write_text(text.replace("stiffness_N_mm2 = 7.0", "stiffness_N_mm2 = 8.0"), encoding="utf-8")
+    assert stated(read_manifest(manifest).cases[1]) != stated(case)
+    known = described(made)
+    assert other_file(case, known) == ""
+    (study / "p.toml").write_text((study / "p.toml").read_text().replace("0.03", "0.04"), encoding="utf-8")
+    assert other_file(case, known) == f"parameters, now {study / 'p.toml'}"
 
 
 def test_cases_of_different_friction_are_not_calibrated_together(study, capsys):

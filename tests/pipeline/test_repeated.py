@@ -1,12 +1,13 @@
 """Scans are known again by their voxels, whatever file and order of axes these are kept in."""
 
+from dataclasses import replace
 from itertools import permutations, product
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pipeline.arrays.fingerprint import known_by
+from pipeline.arrays.fingerprint import known_by, known_with_place
 from pipeline.arrays.grids import towards_lps
 from pipeline.model import Volume
 
@@ -39,6 +40,8 @@ def test_one_scan_whose_axes_are_stored_in_another_order_is_one(kind: str) -> No
         assert other.values[at] == values[2, 3, 4], "it is the same scan in space"
         np.testing.assert_array_equal(towards_lps(other), values)
         assert known_by(other) == known_by(scan)
+        assert known_with_place(other) == known_with_place(scan)
+    assert known_with_place(replace(scan, origin_mm=scan.origin_mm + 0.1)) != known_with_place(scan)
 
 
 def test_another_scan_is_another() -> None:
