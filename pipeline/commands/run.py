@@ -187,7 +187,8 @@ def _guard(args: argparse.Namespace, manifest: "Manifest", computed: "Set[str]",
 
     if not (args.resume or args.fresh):
         guard_out(args.out, manifest.path, settings)
-    guard_kept(args.out, {case.id: case for case in manifest.cases if case.id not in computed}, settings)
+    others = {case.id: case for case in manifest.cases if case.id not in computed}
+    guard_kept(args.out, others, settings, files=bool(args.only) or args.resume or args.fresh)
     if not args.fresh:
         guard_stages(args.out, args.until)
 

@@ -47,16 +47,18 @@ def guard_out(out: Path, manifest: Path, settings: Resolved) -> None:
         raise UsageError([f"{out} was run with other settings: {others}; name another folder, or {allowed}"])
 
 
-def guard_kept(out: Path, others: Mapping[str, Case], settings: Resolved) -> None:
+def guard_kept(out: Path, others: Mapping[str, Case], settings: Resolved, *, files: bool) -> None:
     """Refuse what differs from that of cases which this run keeps, settings or their inputs: all of them are pooled.
 
-    others : the manifest's cases that this run does not compute, by id.
+    others : the manifest's cases that this run does not compute, by id.     files : whether these are asked for, too.
+    The shards of an array are not to: each of them would look at those of all others.
     """
     with suppress(ValueError):  # an unreadable result is not pooled
         for folder in find_cases(out):
             if folder.name not in others:
                 continue
-            changed = _otherwise(read_json(folder / "result.json"), others[folder.name], settings)
+            known, case = read_json(folder / "result.json"), others[folder.name]
+            changed = _otherwise(known, case, settings) or (_other_file(known, case) if files else "")
             if changed:
                 what = f"{out}: case {folder.name!r} would keep its result of {changed}"
                 raise UsageError([f"{what}; run all cases (no --only, no --shard), or name another folder"])
@@ -68,6 +70,10 @@ def _otherwise(known: Mapping[str, Any], case: Case, settings: Resolved) -> str:
         return f"other settings: {changed}"
     if known.get("stated") not in (None, "", stated(case)):
         return "another manifest, which stated it otherwise"
+    return ""
+
+
+def _other_file(known: Mapping[str, Any], case: Case) -> str:
     file = other_file(case, known["inputs"]) if "inputs" in known else ""
     return f"another file: {file}" if file else ""
 

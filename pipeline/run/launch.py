@@ -164,9 +164,7 @@ def launch(plan: Plan) -> tuple[Totals, Path]:
     (out / "summary.pdf").unlink(missing_ok=True)  # of an earlier result
     info |= {"provenance": code_state(), "assumptions": plan.assumptions}
     Store(plan.template.cache).trim()
-    totals = replace(
-        aggregate(out, info, name), sweep_lost=len(lost_points(out, heads, {case.id for case in plan.cases}))
-    )
+    totals = replace(aggregate(out, info, name), sweep_lost=len(lost_points(out, heads, plan.ids)))
     return totals, render_index(out, plan.template.embed, each_on(1 if plan.address else plan.workers))
 
 
