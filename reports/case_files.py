@@ -1,7 +1,7 @@
 """The folder of one case, read: result.json, errors.csv, points.csv.gz, frames.h5. Any of them may be missing."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -182,9 +182,14 @@ def amiss(folder: Path) -> str:
     return ""
 
 
+def manifests_in(runs: Iterable[Mapping[str, Any]]) -> list[str]:
+    """The manifests that runs say they are of, each once: the first digits of their hashes."""
+    return list(dict.fromkeys(str(run["manifest_sha256"])[:12] for run in runs if "manifest_sha256" in run))
+
+
 def manifests_sentence(out_dir: Path) -> str:
     """That the runs into a folder were of several manifests, which may state one wire otherwise; empty where of one."""
-    found = dict.fromkeys(str(run["manifest_sha256"])[:12] for run in _runs(out_dir) if "manifest_sha256" in run)
+    found = manifests_in(_runs(out_dir))
     if len(found) < 2:
         return ""
     return (

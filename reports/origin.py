@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from reports.case_files import listed, read_json, results_in
+from reports.case_files import listed, manifests_in, read_json, results_in
 
 CODE = {"wireval": "wireval", "git_commit": "commit", "git_dirty": "changed files", "python": "Python"}
 ABSENT, TOLD, UNTOLD = "(none)", "stand in its results", "(not kept)"
@@ -77,7 +77,7 @@ def _whole(out: Path, found: Mapping[str, Mapping[str, Any]]) -> Told:
     runs = {path.name: read_json(path) for path in sorted(out.glob("run*.json"))}
     told = _over({name: _made(r) | _code(r) for name, r in found.items()})
     told = told or _over({name: _made(r) | _code(r) for name, r in runs.items()})
-    hashes = dict.fromkeys(str(run["manifest_sha256"])[:12] for run in runs.values() if "manifest_sha256" in run)
+    hashes = manifests_in(runs.values())
     return told | ({"manifest": " and ".join(hashes)} if hashes else {})
 
 

@@ -4,7 +4,6 @@ It needs the traces of all cases, so it is computed after them and stands in ove
 """
 
 import math
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -37,14 +36,14 @@ Traces = Mapping[int, tuple[float, Array]]
 def with_another(out: Path, found: Sequence[Found]) -> list[Found]:
     """The cases, with the predictor's error added to the frames' rows where other insertions share the phantom."""
     phantoms = phantoms_of(case.result for case in found)
-    count = Counter(phantoms.values())
-    shared = [case for case in found if count[phantoms.get(case.result.case, "")] > 1]
-    traces = {case.result.case: _traces(out, case) for case in shared}
-    skip_mm = _skip_mm(out, shared[0]) if shared else 0.0
     kin: dict[str, list[Found]] = {}
-    for case in shared:
-        kin.setdefault(phantoms[case.result.case], []).append(case)
-    own = {case.result.case: kin[phantoms[case.result.case]] for case in shared}
+    for case in found:
+        if case.result.case in phantoms:
+            kin.setdefault(phantoms[case.result.case], []).append(case)
+    shared = [cases for cases in kin.values() if len(cases) > 1]
+    own = {case.result.case: cases for cases in shared for case in cases}
+    traces = {case.result.case: _traces(out, case) for cases in shared for case in cases}
+    skip_mm = _skip_mm(out, shared[0][0]) if shared else 0.0
     return [_with_another(c, own[c.result.case], traces, skip_mm) if c.result.case in own else c for c in found]
 
 

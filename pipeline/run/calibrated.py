@@ -59,7 +59,7 @@ def as_calibrated(
 
 
 def _with_clamp(case: Case, changed: Case, found: Parameters) -> Case:
-    """The case, and the one whose clamp it borrows, both with the parameters."""
+    """The case and the one whose clamp it borrows, both with the parameters, and what was stated before."""
     other, update = case.entry_case, dict[str, object](as_stated=stated(case))
     if other is not None and other.wire.name == found.wire:
         update["entry_case"] = with_parameters(other, found, ())

@@ -65,9 +65,9 @@ def stated(case: Case) -> str:
     return hashlib.sha256(f"{case.model_dump_json(exclude=UNSTATED)}{other}".encode()).hexdigest()[:16]
 
 
-def contents_of(case: Case) -> str:
-    """A hash of the contents of a case's files, by their keys."""
-    rows = sorted((str(row["key"]), str(row["sha256"])) for row in described(case))
+def contents_of(files: Sequence[Mapping[str, Any]]) -> str:
+    """A hash of the contents of a case's files, by their keys. files : as ``described``."""
+    rows = sorted((str(row["key"]), str(row["sha256"])) for row in files)
     return hashlib.sha256(repr(rows).encode()).hexdigest()[:16]
 
 

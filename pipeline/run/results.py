@@ -152,9 +152,8 @@ def names_of(case: Case, known: Known) -> tuple[str, ...]:
 
     Nothing of the latter where the vessel was segmented from a scan with the wire in it.
     """
-    from_reference = case.lumen is None and case.reference is not None and known.lumen is not None
-    seen = [known.lumen.of_scan] if from_reference and known.lumen is not None else []
-    return (*[f"stated: {case.phantom}"] * bool(case.phantom), *seen)
+    seen = "" if case.reference is None or known.lumen is None else known.lumen.of_scan
+    return (*[f"stated: {case.phantom}"] * bool(case.phantom), *[seen] * bool(seen))
 
 
 def result_of(case: Case, known: Known, summary: dict[str, Any], key: str, details: dict[str, Any]) -> Result:
@@ -172,7 +171,7 @@ def result_of(case: Case, known: Known, summary: dict[str, Any], key: str, detai
     scans = (*data_of(case), *(frame.voxels for frame in known.frames if frame.voxels))
     source = case.lumen or case.reference
     phantom = "" if source is None else digest(source)
-    inputs = scans, names_of(case, known), stated(case), contents_of(case)
+    inputs = scans, names_of(case, known), stated(case), contents_of(details["inputs"])
     return Result(*head, frames, failure_rows(case.id, known), summary, key, phantom, *inputs, details)
 
 

@@ -87,12 +87,12 @@ def found_heads(out: Path) -> list[Head]:
     return list(found.values())
 
 
-def asked_of(out: Path, head: Head) -> set[str]:
-    """The cases for which the runs into an output folder were to compute a point."""
-    found: set[str] = set()
+def asked_of(out: Path) -> dict[Path, set[str]]:
+    """By the folder of each point, the cases for which the runs into an output folder were to compute it."""
+    found: dict[Path, set[str]] = {}
     for run in map(read_json, out.glob("run*.json")):
-        if any(_folder(head) == _folder(one) for one in run.get("sweep", ())):
-            found |= set(run.get("swept", ()))
+        for head in run.get("sweep", ()):
+            found.setdefault(_folder(head), set()).update(run.get("swept", ()))
     return found
 
 
@@ -108,11 +108,15 @@ def lost_points(out: Path, heads: Sequence[Head], cases: Container[str] | None =
 
     cases : those that are asked for at each point; None: those that the runs into the folder were to compute.
     """
-    plain, lost_ones = found_results(out), list[tuple[Path, Result]]()
-    for head in heads:
-        folder, asked = _folder(head), asked_of(out, head) if cases is None else cases
+    if not heads:
+        return []
+    folders = [_folder(head) for head in heads]
+    plain, asked = found_results(out), asked_of(out) if cases is None else dict.fromkeys(folders, cases)
+    lost_ones: list[tuple[Path, Result]] = []
+    for folder in folders:
         there = {result.case: result for result in found_results(out / folder)}
-        lost_ones += [(folder, one) for case in plain if (one := _amiss(out / folder, case, there, asked))]
+        wanted = asked.get(folder, ())
+        lost_ones += [(folder, one) for case in plain if (one := _amiss(out / folder, case, there, wanted))]
     return lost_ones
 
 

@@ -136,9 +136,10 @@ def infer_entry(frame: Volume, reference: Volume | None, file: Path, last: Array
     edge = np.minimum(voxels, np.array(frame.shape) - 1 - voxels).min(axis=1)
     entry, which = points[np.argmin(edge)], AT_EDGE
     if len(last):
-        off = np.linalg.norm(_ends(points)[:, None] - _ends(last), axis=2).min(axis=1)
+        ends = _ends(points)
+        off = np.linalg.norm(ends[:, None] - _ends(last), axis=2).min(axis=1)
         if off.min() < 0.5 * reach < off.max() - off.min():
-            entry, which = _ends(points)[np.argmin(off)], IN_PLACE
+            entry, which = ends[np.argmin(off)], IN_PLACE
     near = points[np.linalg.norm(points - entry, axis=1) < reach]
     axis = np.linalg.svd(near - near.mean(axis=0))[2][0]
     return entry, np.asarray(axis * np.sign((near.mean(axis=0) - entry) @ axis)), which
