@@ -140,6 +140,12 @@ RIDGE_VOXELS = 0.05
 that curves with two voxels of radius rises by a fifteenth of that."""
 DETOUR_MM = 1.5
 """How far off the straight way between two feet lumen may still join them: a wire may cut off so much of a carina."""
+BURIED_VOXELS = 0.5
+"""Least distance, in voxels, at which a wire's axis is deep in the wall on its way over an edge, however thin the wire
+is: the grid does not hold the edge any better."""
+BURIED_DETOUR = 1.75
+"""How much longer than the straight way between its two feet the way around may be for a wire so deep: as it is round
+an edge of 70 degrees, those of necks and rings being blunter."""
 FLOOD_CELLS = 48
 """Most cells along the way of a flood fill, however fine the grid is."""
 REFINE = 0.2

@@ -4,6 +4,8 @@ A step may rest on the ridge between two lumens and go down on the far side in t
 place on the wire is led back, down the distance, to the lumen it belongs to (its foot). From one place to the next the
 foot moves a little; where the straight way between two feet rises over a ridge of the distance, the wire has changed
 lumens, unless both feet are joined by lumen nearby: then the ridge is the edge of a carina or of an aneurysm's neck.
+There a wire may press on the edge, and a soft wall gives way. In a narrow wedge it hardly resists: where the whole
+cross-section is buried between the two lumens, the way around must be about as short as the way through.
 """
 
 import math
@@ -26,26 +28,28 @@ def through_wall(field: Field, x: Any, k: int, margin: float) -> bool:
     """Whether a wire with joints x, of k segments, comes through a wall. margin : its radius, mm."""
     if not passes_crease(field, x, k):
         return False
-    level, last, known, inside = -margin, (0.0, 0.0, 0.0, 0.0), False, False
+    level, last, known, inside, highest = -margin, (0.0, 0.0, 0.0, 0.0), False, False, 0.0
+    buried = max(margin, tol.BURIED_VOXELS * field.spacing)
     for n in range(1, k + 1):
         a, b = load3(x, n - 1), load3(x, n)
         d = minus(b, a)
         way = math.sqrt(dot(d, d))
         if not near_crease(field, a, b, way):
-            known = False
+            known, highest = False, 0.0
             continue
         steps = math.ceil(2 * way / field.spacing)
         i = 1 if known else 0
         while i <= steps:
             q = mix(1.0 - i / steps, a, i / steps, b)
             v = distance(field, q)
-            room = level - v
+            room, highest = level - v, max(highest, v)
             here = (q[0], q[1], q[2], v) if room >= 0.0 else foot(field, q, v, level)
             if here[3] < math.inf:
                 # a wire that stays in its lumen is its own foot
-                if known and not (inside and room >= 0.0) and parted(field, last, here, level):
+                stays = not known or (inside and room >= 0.0)
+                if not stays and parted(field, last, here, level, highest > buried):
                     return True
-                last, known, inside = here, True, room >= 0.0
+                last, known, inside, highest = here, True, room >= 0.0, v
             # skip the places that must be inside as well, since the distance's slope is bounded
             i += 1 + int(max(room, 0.0) * steps / (field.slope * way))
     return False
@@ -118,25 +122,33 @@ def foot(field: Field, q: Three, v: float, level: float) -> Foot:
 
 
 @kernel
-def parted(field: Field, a: Foot, b: Foot, level: float) -> bool:
-    """Whether a ridge lies between two feet, and no way through lumen around it nearby."""
+def parted(field: Field, a: Foot, b: Foot, level: float, buried: bool) -> bool:
+    """Whether a ridge lies between two feet, and no way through lumen around it nearby.
+
+    buried : whether the wire's whole cross-section lies in the wall there.
+    """
     # where the lumen is narrower than the wire, all of the lumen counts, not only where the wire has room
     top = tol.RIDGE_VOXELS * field.spacing + (level if max(a[3], b[3]) <= level else max(a[3], b[3], 0.0))
     p, q = a[:3], b[:3]
-    d = minus(q, p)
-    steps = math.ceil(4 * math.sqrt(dot(d, d)) / field.spacing)
+    steps = math.ceil(4 * apart(p, q) / field.spacing)
     for i in range(1, steps):
         if distance(field, mix(1.0 - i / steps, p, i / steps, q)) > top:
-            return not joined(field, deeper(field, a), deeper(field, b), top)
+            inner, outer = deeper(field, a), deeper(field, b)
+            longest = apart(inner, outer) + 2 * tol.DETOUR_MM
+            if buried:
+                around = tol.BURIED_DETOUR * apart(p, q) + apart(p, inner) + apart(q, outer)
+                longest = min(longest, around + 0.5 * field.spacing)
+            return not joined(field, inner, outer, top, longest)
     return False
 
 
 @owner
-def joined(field: Field, p: Three, q: Three, top: float) -> bool:
-    """Whether a way on which the distance stays below ``top`` leads from p to q nearby: a flood fill from p."""
-    d = minus(q, p)
-    way = math.sqrt(dot(d, d))
-    limit = way + 2 * tol.DETOUR_MM
+def joined(field: Field, p: Three, q: Three, top: float, limit: float) -> bool:
+    """Whether a way on which the distance stays below ``top`` leads from p to q: a flood fill from p.
+
+    limit : of the sum of a place's distances from p and q, mm.
+    """
+    way = apart(p, q)
     cell = max(0.5 * field.spacing, limit / tol.FLOOD_CELLS)
     n = math.ceil(0.5 * (limit + way) / cell) + 1
     seen = np.zeros((2 * n + 1, 2 * n + 1, 2 * n + 1), np.uint8)
@@ -150,9 +162,8 @@ def joined(field: Field, p: Three, q: Three, top: float) -> bool:
             move = 1 - 2 * (side % 2)
             i, j, k = i + move * (side < 2), j + move * (2 <= side < 4), k + move * (side >= 4)
             here = (p[0] + (i - n) * cell, p[1] + (j - n) * cell, p[2] + (k - n) * cell)
-            e, f = minus(here, p), minus(here, q)
-            left = math.sqrt(dot(f, f))
-            if seen[i, j, k] or math.sqrt(dot(e, e)) + left > limit:
+            left = apart(here, q)
+            if seen[i, j, k] or apart(here, p) + left > limit:
                 continue
             seen[i, j, k] = 1
             if distance(field, here) <= top:
@@ -162,6 +173,13 @@ def joined(field: Field, p: Three, q: Three, top: float) -> bool:
                 count += 1
         first += 1
     return False
+
+
+@inlined
+def apart(a: Three, b: Three) -> float:
+    """Distance of two places from each other, mm."""
+    d = minus(b, a)
+    return math.sqrt(dot(d, d))
 
 
 @kernel
