@@ -43,10 +43,21 @@ class Difference:
 
     @property
     def regressions(self) -> pd.DataFrame:
-        """The rows that became worse, the worst first: what is missing, then by how many times what is allowed."""
+        """The rows that became worse, the worst first: what is missing, then by how many times what is allowed.
+
+        Last what the second run does not have at all, in no frame: another simulator has no push force.
+        """
         rows = self.rows[self.rows["verdict"] == "regression"]
         times = (rows["change"].abs() / rows["allowed"]).fillna(math.inf)
+        times[rows["column"].isin(self.lacking)] = -1.0
         return rows.loc[times.sort_values(ascending=False, kind="stable").index]
+
+    @property
+    def lacking(self) -> list[str]:
+        """The columns that the first run has values of, and the second has in no frame."""
+        held = self.rows[self.rows["allowed"].notna() & self.rows["before"].notna()]
+        seen = held["after"].notna().groupby(held["column"], sort=False).any()
+        return [str(column) for column, found in seen.items() if not found]
 
     @property
     def judged(self) -> bool:
@@ -93,6 +104,8 @@ class Difference:
         names = ", ".join(self.moved["column"].unique())
         have = "value has" if len(self.moved) == 1 else "values have"
         tail = f"; {len(self.moved)} {have} moved: {names}" if names else ""
+        if self.lacking:
+            tail += f"; the second run has no {', '.join(self.lacking)} in any frame"
         if self.empty:
             tail += f"; the first run has nothing to hold against in {', '.join(self.empty)}"
         if len(self.new):

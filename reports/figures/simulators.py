@@ -1,18 +1,23 @@
 """Several simulators side by side: error along the wire and over depth, and who is nearest where."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import cycle
 
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
+from matplotlib.colors import to_hex, to_rgb
 
 from reports.colours import SIMULATED
-from reports.figures._drawing import Drawing, legend, new_figure, plain, positive_axis
+from reports.figures._drawing import Array, Drawing, legend, new_figure, plain, positive_axis
 from reports.figures._style import PALETTE
 from reports.verdict import OURS, TIPS_OFF
 
 _FAINT = 0.3  # of a lead that is not clear
+_SHADES: tuple[Callable[[Array], Array], ...] = (
+    lambda colour: colour, lambda colour: 0.5 * colour, lambda colour: 0.5 + 0.5 * colour,
+)  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,8 +34,9 @@ def leads(where: pd.DataFrame) -> pd.DataFrame:
 
 
 def colours(names: "pd.Series[str]") -> dict[str, str]:
-    """The solver's own in its colour, every other simulator in one of its own."""
-    spare = cycle(PALETTE[1:])
+    """The solver's own in its colour, every other simulator in one of its own; beyond fifteen they repeat."""
+    shades = (shade(np.array(to_rgb(colour))) for shade in _SHADES for colour in PALETTE[1:])
+    spare = cycle(to_hex(colour) for colour in shades)
     return {name: SIMULATED if name == OURS else next(spare) for name in dict.fromkeys(names)}
 
 
@@ -46,7 +52,7 @@ def who_is_nearest(files: SimulatorFiles) -> Drawing | None:
         for number, (name, mine) in enumerate(rows.groupby("simulator", sort=False)):
             middle, rms = unbroken(mine)
             # gaps at other places in each show the line below where two lie on each other
-            style = ("o-", "o--", "o-.", "o:")[number % 4]
+            style = "osD^v"[number // 4 % 5] + ("-", "--", "-.", ":")[number % 4]
             axes.plot(middle, rms, style, color=shown[str(name)], label=str(name), markersize=4)
         plain(axes)
         _nearest(strip, rows, shown)

@@ -166,3 +166,17 @@ def test_a_frame_that_fails_counts_once() -> None:
     lost = _row(status="no_wire") | dict.fromkeys(TOLERANCE, None)
     found = diff.diff_tables({"c": _table([_row()])}, {"c": _table([lost])}, TOLERANCE)
     assert found.regressions["column"].tolist() == ["status"]
+
+
+def test_what_the_second_run_cannot_have_is_not_the_worst() -> None:
+    """Another simulator has no push force; the sentence named that, and not the error that had become worse."""
+    tolerance = {"rms_mm": 0.1, "push_force_N": 0.1}
+    before = _table([_row(frame=n, push_force_N=0.2) for n in range(3)])
+    after = _table([_row(frame=n, rms_mm=0.5 + 0.2 * n) for n in range(3)])
+    found = diff.diff_tables({"c": before}, {"c": after}, tolerance)
+    assert found.regressions["column"].tolist()[:2] == ["rms_mm", "rms_mm"]
+    assert found.lacking == ["push_force_N"]
+    assert "the second run has no push_force_N in any frame" in found.sentence
+    # missing in one frame alone it is lost there
+    some = after.assign(push_force_N=[0.2, 0.2, float("nan")])
+    assert diff.diff_tables({"c": before}, {"c": some}, tolerance).lacking == []

@@ -21,10 +21,12 @@ from reports.figures import RunFiles, _drawing, _planes, declared, figures_of
 from reports.figures._drawing import LEAST_MM, Drawing, FrameAxis, positive_axis
 from reports.figures._style import STAGE_COLOURS, lines, predictors
 from reports.figures.along_wire import _CLIP_PERCENTILE
+from reports.figures.simulators import colours as colours_of
 from reports.figures.simulators import unbroken
 from reports.frames_file import FrameArrays, ScanCrop, frame_numbers, read_frame, read_scan, write_frames
 from reports.page import draw_sections
 from reports.schema import BUDGET, ENTRIES, ERRORS, POINTS, SUMMARY, SWEEP, TIMINGS
+from reports.verdict import OURS
 from tests.reports.fake_results import FakeCase, write_run
 
 CASE_FIGURES = figures_of("case")
@@ -622,3 +624,9 @@ def test_marks_of_frames_lie_where_their_values_are_drawn() -> None:
     first, second = Drawing(figure, pd.DataFrame(), frames=frames).marks
     assert first == {"box": [10.0, 20.0, 50.0, 60.0], "across": True, "at": {"0": 10.0, "3": 35.0}}
     assert second == {"box": [70.0, 20.0, 20.0, 60.0], "across": False, "at": {"0": 26.0, "4": 74.0}}
+
+
+def test_fifteen_simulators_have_fifteen_colours() -> None:
+    """From the sixth on they repeated."""
+    shown = colours_of(pd.Series([OURS, *(f"S{n}" for n in range(15))]))
+    assert len(set(shown.values())) == 16
