@@ -35,8 +35,8 @@ def leads(where: pd.DataFrame) -> pd.DataFrame:
 
 def colours(names: "pd.Series[str]") -> dict[str, str]:
     """The solver's own in its colour, every other simulator in one of its own; beyond fifteen they repeat."""
-    shades = (shade(np.array(to_rgb(colour))) for shade in _SHADES for colour in PALETTE[1:])
-    spare = cycle(to_hex(colour) for colour in shades)
+    shades = (shade(np.array(to_rgb(colour))).tolist() for shade in _SHADES for colour in PALETTE[1:])
+    spare = cycle(to_hex(tuple(colour)) for colour in shades)
     return {name: SIMULATED if name == OURS else next(spare) for name in dict.fromkeys(names)}
 
 
