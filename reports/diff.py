@@ -23,6 +23,7 @@ BEFORE_COMPARE = {
 }
 """What a run has that ended before frames are compared: no number of it says how far a simulated wire is off."""
 FITTED = "roll_fitted"
+_LACKING = "in no frame"
 CLOSING = ("regression", "moved")
 """Verdicts on a row for which a gate must close."""
 _HEADER = ["case", "frame", "column", "before", "after", "change", "allowed", "verdict"]
@@ -43,21 +44,15 @@ class Difference:
 
     @property
     def regressions(self) -> pd.DataFrame:
-        """The rows that became worse, the worst first: what is missing, then by how many times what is allowed.
-
-        Last what the second run does not have at all, in no frame: another simulator has no push force.
-        """
+        """The rows that became worse, the worst first: what is missing, then by how many times what is allowed."""
         rows = self.rows[self.rows["verdict"] == "regression"]
         times = (rows["change"].abs() / rows["allowed"]).fillna(math.inf)
-        times[rows["column"].isin(self.lacking)] = -1.0
         return rows.loc[times.sort_values(ascending=False, kind="stable").index]
 
     @property
     def lacking(self) -> list[str]:
         """The columns that the first run has values of, and the second has in no frame."""
-        held = self.rows[self.rows["allowed"].notna() & self.rows["before"].notna()]
-        seen = held["after"].notna().groupby(held["column"], sort=False).any()
-        return [str(column) for column, found in seen.items() if not found]
+        return list(dict.fromkeys(self.rows["column"][self.rows["after"].eq(_LACKING)]))
 
     @property
     def judged(self) -> bool:
@@ -101,9 +96,10 @@ class Difference:
     def sentence(self) -> str:
         """One line for the end of the command."""
         n_bad, head = len(self.regressions), self._compared()
-        names = ", ".join(self.moved["column"].unique())
-        have = "value has" if len(self.moved) == 1 else "values have"
-        tail = f"; {len(self.moved)} {have} moved: {names}" if names else ""
+        moved = self.moved[self.moved["after"].ne(_LACKING)]
+        names = ", ".join(moved["column"].unique())
+        have = "value has" if len(moved) == 1 else "values have"
+        tail = f"; {len(moved)} {have} moved: {names}" if names else ""
         if self.lacking:
             tail += f"; the second run has no {', '.join(self.lacking)} in any frame"
         if self.empty:
@@ -195,7 +191,23 @@ def diff_tables(
         else:
             new = [*_case_rows(after[case].iloc[:0], after[case], tolerance)]
             rows += [(case, *row) for row in new or [(pd.NA, "case", "missing", "present", math.nan, math.nan, "new")]]
-    return Difference(pd.DataFrame(rows, columns=_HEADER))
+    return Difference(pd.DataFrame(_lacking_once(rows), columns=_HEADER))
+
+
+def _lacking_once(rows: list[Row]) -> list[Row]:
+    """The rows, those of a column that the second run has in no frame as one for each case.
+
+    It lacks the truth, or is of a simulator that has no push force: that is another thing, and not worse.
+    """
+    seen: dict[str, bool] = {}
+    for _, _, column, before, after, *_, allowed, _ in rows:
+        if not math.isnan(allowed) and not math.isnan(before):
+            seen[column] = seen.get(column, False) or not math.isnan(after)
+    lacking = {column for column, found in seen.items() if not found}
+    kept = [row for row in rows if row[2] not in lacking]
+    cases = dict.fromkeys((row[0], row[2]) for row in rows if row[2] in lacking and not math.isnan(row[3]))
+    lost = [(case, pd.NA, column, "present", _LACKING, math.nan, math.nan, "moved") for case, column in cases]
+    return [*kept, *lost]
 
 
 def _case_rows(before: pd.DataFrame, after: pd.DataFrame, tolerance: Mapping[str, float]) -> Iterator[Row]:
