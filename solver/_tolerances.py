@@ -135,14 +135,22 @@ FOOT_STEPS = 64
 """Steps of half a voxel down the distance until a place in the wall is given up as belonging to no lumen."""
 FOOT_MM = 1e-9
 """Difference from the distance at which feet end, mm, that is rounding: without it every third place was given up."""
+RIDGE_BEND = 0.5
+"""Fall of the distance's slope over a voxel from which on a place with little slope is on a ridge: there it falls by up
+to 2, at a carina's edge by less than it rises in the other direction, and round a vessel's own axis it rises."""
 RIDGE_VOXELS = 0.05
 """Rise of the distance above both ends of a way, in voxels, that is a ridge: the chord of a foot's move along a wall
 that curves with two voxels of radius rises by a fifteenth of that."""
+OPEN_VOXELS = 0.35
+"""Distance, in voxels, by which a place must be inside the lumen for it to be open, be it narrower than the wire: where
+vessels touch, what the grid holds of the wall between them lies up to a quarter inside."""
 DETOUR_MM = 1.5
 """How far off the straight way between two feet lumen may still join them: a wire may cut off so much of a carina."""
-BURIED_VOXELS = 0.5
-"""Least distance, in voxels, at which a wire's axis is deep in the wall on its way over an edge, however thin the wire
-is: the grid does not hold the edge any better."""
+BURIED_RADII = 4.0
+"""Way from lumen to lumen, over the wire's radius or half a voxel, from which on its whole cross-section is in the wall
+on its way over an edge: the feet of the way are a radius deep in the lumens."""
+SUNK_RADII = 8.0
+"""The same, from which on no edge is so blunt that the wire only presses on it: a wall of about six radii."""
 BURIED_DETOUR = 1.75
 """How much longer than the straight way between its two feet the way around may be for a wire so deep: as it is round
 an edge of 70 degrees, those of necks and rings being blunter."""

@@ -4,8 +4,9 @@ A step may rest on the ridge between two lumens and go down on the far side in t
 place on the wire is led back, down the distance, to the lumen it belongs to (its foot). From one place to the next the
 foot moves a little; where the straight way between two feet rises over a ridge of the distance, the wire has changed
 lumens, unless both feet are joined by lumen nearby: then the ridge is the edge of a carina or of an aneurysm's neck.
-There a wire may press on the edge, and a soft wall gives way. In a narrow wedge it hardly resists: where the whole
-cross-section is buried between the two lumens, the way around must be about as short as the way through.
+There a wire may press on the edge, and a soft wall gives way. In a narrow wedge it hardly resists: where the wall is so
+thick that the whole cross-section is buried in it, the way around must be about as short as the way through, and where
+it is much thicker there is none.
 """
 
 import math
@@ -28,28 +29,27 @@ def through_wall(field: Field, x: Any, k: int, margin: float) -> bool:
     """Whether a wire with joints x, of k segments, comes through a wall. margin : its radius, mm."""
     if not passes_crease(field, x, k):
         return False
-    level, last, known, inside, highest = -margin, (0.0, 0.0, 0.0, 0.0), False, False, 0.0
-    buried = max(margin, tol.BURIED_VOXELS * field.spacing)
+    level, last, known, inside = -margin, (0.0, 0.0, 0.0, 0.0), False, False
     for n in range(1, k + 1):
         a, b = load3(x, n - 1), load3(x, n)
         d = minus(b, a)
         way = math.sqrt(dot(d, d))
         if not near_crease(field, a, b, way):
-            known, highest = False, 0.0
+            known = False
             continue
         steps = math.ceil(2 * way / field.spacing)
         i = 1 if known else 0
         while i <= steps:
             q = mix(1.0 - i / steps, a, i / steps, b)
             v = distance(field, q)
-            room, highest = level - v, max(highest, v)
+            room = level - v
             here = (q[0], q[1], q[2], v) if room >= 0.0 else foot(field, q, v, level)
             if here[3] < math.inf:
                 # a wire that stays in its lumen is its own foot
                 stays = not known or (inside and room >= 0.0)
-                if not stays and parted(field, last, here, level, highest > buried):
+                if not stays and parted(field, last, here, level):
                     return True
-                last, known, inside, highest = here, True, room >= 0.0, v
+                last, known, inside = here, True, room >= 0.0
             # skip the places that must be inside as well, since the distance's slope is bounded
             i += 1 + int(max(room, 0.0) * steps / (field.slope * way))
     return False
@@ -99,7 +99,7 @@ def distance(field: Field, q: Three) -> float:
 def foot(field: Field, q: Three, v: float, level: float) -> Foot:
     """Go down the distance from a place, where it is v, to ``level``, mm, or to where a narrower lumen is deepest."""
     c = field.coefficients
-    for _ in range(tol.FOOT_STEPS):
+    for n in range(tol.FOOT_STEPS):
         if v <= level + tol.FOOT_MM:
             # the last of these steps ends a rounding above the level or below it
             v = min(v, level)
@@ -108,8 +108,13 @@ def foot(field: Field, q: Three, v: float, level: float) -> Foot:
         g = first[1:]
         square = dot(g, g)
         # hardly any slope is the floor of a lumen where the distance curves upwards, and a ridge where it does not
-        floor = square < 0.5 and second[0] + second[1] + second[2] > 0.0
+        even, bends = square < 0.5, second[0] + second[1] + second[2]
+        floor = even and bends > 0.0
         if floor and v < 0.5 * field.spacing:
+            break
+        # a place on a ridge belongs to neither side: it would slide along to the edge, where the two meet
+        if n == 0 and even and bends * field.spacing < -tol.RIDGE_BEND:
+            v = math.inf
             break
         step = min((v - level) / max(square, 1e-12), 0.5 * field.spacing / math.sqrt(max(square, 1e-12)))
         lower = mix(1.0, q, -step, g)
@@ -122,23 +127,24 @@ def foot(field: Field, q: Three, v: float, level: float) -> Foot:
 
 
 @kernel
-def parted(field: Field, a: Foot, b: Foot, level: float, buried: bool) -> bool:
-    """Whether a ridge lies between two feet, and no way through lumen around it nearby.
-
-    buried : whether the wire's whole cross-section lies in the wall there.
-    """
+def parted(field: Field, a: Foot, b: Foot, level: float) -> bool:
+    """Whether a ridge lies between two feet, and no way through lumen around it nearby."""
     # where the lumen is narrower than the wire, all of the lumen counts, not only where the wire has room
-    top = tol.RIDGE_VOXELS * field.spacing + (level if max(a[3], b[3]) <= level else max(a[3], b[3], 0.0))
+    top = level if max(a[3], b[3]) <= level else max(a[3], b[3], 0.0)
+    top = tol.RIDGE_VOXELS * field.spacing + max(top, -tol.OPEN_VOXELS * field.spacing)
     p, q = a[:3], b[:3]
-    steps = math.ceil(4 * apart(p, q) / field.spacing)
+    through = apart(p, q)
+    steps = math.ceil(4 * through / field.spacing)
     for i in range(1, steps):
         if distance(field, mix(1.0 - i / steps, p, i / steps, q)) > top:
             inner, outer = deeper(field, a), deeper(field, b)
             longest = apart(inner, outer) + 2 * tol.DETOUR_MM
-            if buried:
-                around = tol.BURIED_DETOUR * apart(p, q) + apart(p, inner) + apart(q, outer)
+            # in radii: the feet are a radius deep in the lumens
+            thick = through / max(-level, 0.5 * field.spacing)
+            if thick > tol.BURIED_RADII:
+                around = math.hypot(tol.BURIED_DETOUR * through, 2 * max(apart(p, inner), apart(q, outer)))
                 longest = min(longest, around + 0.5 * field.spacing)
-            return not joined(field, inner, outer, top, longest)
+            return thick > tol.SUNK_RADII or not joined(field, inner, outer, top, longest)
     return False
 
 
@@ -149,7 +155,7 @@ def joined(field: Field, p: Three, q: Three, top: float, limit: float) -> bool:
     limit : of the sum of a place's distances from p and q, mm.
     """
     way = apart(p, q)
-    cell = max(0.5 * field.spacing, limit / tol.FLOOD_CELLS)
+    cell = max(0.25 * field.spacing, limit / tol.FLOOD_CELLS)
     n = math.ceil(0.5 * (limit + way) / cell) + 1
     seen = np.zeros((2 * n + 1, 2 * n + 1, 2 * n + 1), np.uint8)
     queue = np.empty((seen.size, 3), np.int16)

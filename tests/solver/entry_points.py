@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from solver._compile import on_disk
-from solver._kernels import blocks, closed_form, energy, forces, forks, newton, rollout, rotation, start
+from solver._kernels import blocks, closed_form, energy, forces, forks, newton, rollout, rotation, septum, start
 from solver._kernels.flags import FAST
 from solver._kernels.lanes import field as lane_field
 from solver._kernels.lanes.vectors import in_lanes
@@ -26,6 +26,11 @@ def place(chain: Any, state: Any, slot: int, k: int) -> None:
 @entry_point
 def sweep(problem: Any, slot: int, k: int, damping: float, report: Any) -> bool:
     return newton.sweep(problem, slot, 0, k, damping, report)
+
+
+@entry_point
+def through_wall(field: Any, x: Any, k: int, margin: float) -> bool:
+    return septum.through_wall(field, x, k, margin)
 
 
 @entry_point

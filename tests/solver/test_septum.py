@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -250,29 +249,3 @@ def test_a_hole_in_the_lumen_is_no_septum() -> None:
     holed = VesselWall(Grid(values, wall.distance.spacing_mm, wall.distance.origin_mm), 1.0)
     assert holed.look_up(entry)[0][0] > 0.05
     assert next(Insertion(GuideWire(0.5, 0.18, 0.5), holed, entry, [0, 0, 1]).to_depths([3.0])).converged
-
-
-def buried(x: Array, lumen: Distance) -> float:
-    """Distance, mm, of the wall where a wire crosses the plane of a fork's septum; -inf where it does not."""
-    out = [-np.inf]
-    for a, b in pairwise(x):
-        if a[0] * b[0] < 0.0:
-            out.append(float(lumen(a + a[0] / (a[0] - b[0]) * (b - a))))
-    return max(out)
-
-
-@pytest.mark.parametrize("radius", [0.12, 0.18])
-@pytest.mark.parametrize(("half", "roll"), [(0.25, 20.0), (0.35, 20.0), (0.35, 180.0)])
-def test_a_narrow_carina_is_not_passed_by_sinking_into_it(half: float, roll: float, radius: float) -> None:
-    """The wall's law hardly resists in a wedge: wires lay across a septum of 1.8 mm, 8 radii deep, "converged"."""
-
-    def fork(p: Array) -> Array:
-        return fork_distance(p, 0.6, half, 6.0)
-
-    wall = VesselWall(sampled(fork, 0.3, (-6, -3, -3), (6, 3, 20), "float32"), 2.0)
-    wire = GuideWire(0.5, radius, [[0, 1.0], [10, 2.0]], [[0, 0.55], [5, 0.55], [5, 0]])
-    insertion = Insertion(wire, wall, [0, 0, 0], [0, 0, 1], material_axis=[1, 0, 0])
-    found = list(insertion.to_depths(np.arange(1.0, 17.0), roll))
-    # the edge is known to half a voxel and no better
-    assert max(buried(s.joints_mm, fork) for s in found if s.converged) < max(radius, 0.15) + 0.15
-    assert found[-1].status is Status.THROUGH_WALL
