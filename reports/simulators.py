@@ -8,7 +8,7 @@ from urllib.parse import quote
 import pandas as pd
 
 from reports import _content
-from reports.case_files import counted, find_cases, not_reached, not_run_sentence, warnings_of
+from reports.case_files import counted, find_cases, listed, not_reached, not_run_sentence, warnings_of
 from reports.figures.simulators import SimulatorFiles, leads
 from reports.origin import mixed_settings
 from reports.page import draw_sections, write_page
@@ -18,6 +18,8 @@ from reports.verdict import OURS, TIPS_OFF, badge, tips_off, verdict
 
 PAGE = "simulators.html"
 _MOST_WARNINGS = 5
+_MOST_SHARED = 0.75
+"""Share of a simulator's frames up to which those that count for all of them are few."""
 
 
 def render_simulators(out_dir: Path, embed: bool = False) -> Path:
@@ -38,6 +40,7 @@ def render_simulators(out_dir: Path, embed: bool = False) -> Path:
         "ours": OURS,
         "interval": next(iter(table["interval"].dropna()), ""),
         "simulators": grid,
+        "few": in_common(files.simulators),
         "sections": draw_sections("simulators", files, out_dir, embed),
         "where": _where(files.where),
         "off": sorted(files.where["simulator"][files.where["lead"] == TIPS_OFF].unique()),
@@ -102,6 +105,23 @@ def _doubtful(table: pd.DataFrame) -> "pd.Series[bool]":
     """Whether a simulator has failed frames, or tips that rms_mm does not see."""
     off = [bool(tips_off(dict(row))) for _, row in table.iterrows()]
     return table["frames_ok"].lt(table["frames"]) | pd.Series(off, table.index, dtype=bool)
+
+
+def in_common(rows: pd.DataFrame) -> str:
+    """That skill is over few frames, and who has no more, where one simulator leaves less than most of another's.
+
+    rows : of simulators.csv.
+    """
+    table = rows[rows["against"].isna()]
+    shared, most = table["common_frames"].min(), table["frames_ok"].max()
+    if not shared <= _MOST_SHARED * most:
+        return ""
+    fewer = table[table["frames_ok"].between(1, most - 1)].to_dict("records")
+    names = listed([f"{row['simulator']} ({row['frames_ok']})" for row in fewer])
+    return (
+        f"only {shared:.0f} of {most} frames count for all simulators, and skill_strongest beside others is over "
+        f"these: fewer than {most} count for {names}; a score without them tells more"
+    )
 
 
 def _where(rows: pd.DataFrame) -> _content.Grid | None:

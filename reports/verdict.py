@@ -182,11 +182,13 @@ def _against(statistics: Mapping[str, Any]) -> str:
     if not rival:
         return ""
     value = " ".join(filter(None, (f"skill {number(skill)}", fewer_frames(statistics))))
+    unsure = f"{value}, {_interval_of(least)}" if least <= 0.0 else value
+    would = "it is not shown to be better" if least <= 0.0 else "it would be better"
     said = {
-        TIPS_OFF: f"By rms_mm alone it would be better ({value})",
+        TIPS_OFF: f"By rms_mm alone {would} ({unsure})",
         WORSE: f"That is worse ({value})",
         NO_BETTER: f"That is no better ({value})",
-        NOT_SHOWN: f"It is not shown to be better ({value}, {_interval_of(least)})",
+        NOT_SHOWN: f"It is not shown to be better ({unsure})",
     }
     how = said.get(standing(statistics), f"That is better ({value})")
     return " ".join(filter(None, (f"{how} than {rival}.", _of_frames(statistics))))

@@ -22,7 +22,7 @@ from reports.case_files import listed
 from reports.html import render_index
 from reports.origin import mixed_settings
 from reports.schema import FAILURES, POINTS, SIMULATORS, WHERE
-from reports.simulators import render_simulators
+from reports.simulators import in_common, render_simulators
 from reports.verdict import OURS, TIPS_OFF, tips_off
 
 STEPS_MM = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
@@ -90,8 +90,9 @@ def side_by_side(out: Path, folders: Mapping[str, Path], embed: bool) -> list[st
     """
     write_failures(out, folders)
     said = write_comparison(out, folders)
+    few = in_common(tables.read(out / SIMULATORS.file, SIMULATORS))
     render_index(out, embed)  # its failures are those of all
-    return [*said, f"score of {', '.join(folders)}.  side by side: {render_simulators(out, embed)}"]
+    return [*said, *[few] * bool(few), f"score of {', '.join(folders)}.  side by side: {render_simulators(out, embed)}"]
 
 
 def _common(studies: Studies) -> Frames:
@@ -110,6 +111,7 @@ def _alone(name: str, found: Sequence[Found], common: Frames) -> dict[str, Any]:
     """
     used = validation(found)
     planned = {"frames": sum(case.result.frame_count for case in used), "frames_ok": 0, "within_1mm": 0.0}
+    planned["common_frames"] = len(common)
     alike = [
         replace(c, frames={n: frame for n, frame in c.frames.items() if (c.result.case, n) in common}) for c in used
     ]

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from pipeline.cli import main
 from pipeline.run.simulators import Piece, _rows, side_by_side, write_comparison
 from reports import tables
-from reports.schema import ERRORS, POINTS, SUMMARY, WHERE
-from reports.simulators import _where, render_simulators
+from reports.schema import ERRORS, POINTS, SIMULATORS, SUMMARY, WHERE
+from reports.simulators import _where, in_common, render_simulators
 
 Array = NDArray[np.float64]
 Law = Callable[[Array, Array, np.random.Generator], Array]
@@ -109,6 +109,20 @@ def test_skill_is_over_the_same_frames_for_all(tmp_path: Path) -> None:
     assert list(alone["strongest_frames"].fillna(0)) == [18, 18, 0], "who has none at all takes nobody's away"
     assert alone.loc["wireval", "skill_strongest"] == alone.loc["fewer", "skill_strongest"]
     assert alone.loc["wireval", "rms_mm"] != alone.loc["fewer", "rms_mm"], "over its own frames"
+
+
+def test_who_takes_frames_from_all_is_named(tmp_path: Path) -> None:
+    """A skill over 3 of 12 frames stood on the page, without a word on whose doing that was."""
+    lost = tuple((case, frame) for case in range(CASES) for frame in (1, 2))
+    ours, half = write_tree(tmp_path / "wireval", even(0.2)), write_tree(tmp_path / "half", even(0.2), failed=lost)
+    write_comparison(tmp_path, {"wireval": ours, "half": half})
+    said = in_common(tables.read(tmp_path / "simulators.csv", SIMULATORS))
+    assert said.startswith("only 12 of 24 frames count for all simulators")
+    assert "fewer than 24 count for half (12); " in said
+
+
+def test_nothing_is_said_where_most_frames_count_for_all(compared: Path) -> None:
+    assert in_common(tables.read(compared / "simulators.csv", SIMULATORS)) == ""
 
 
 def test_who_failed_frames_stands_below_who_did_not(tmp_path: Path) -> None:

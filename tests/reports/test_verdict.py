@@ -42,6 +42,18 @@ def test_the_verdict_follows_the_strongest_rival(skill: float, low: float | None
 
 
 @pytest.mark.parametrize(
+    ("low", "said"),
+    [
+        (0.1, "By rms_mm alone it would be better (skill 0.400) than "),
+        (-45.4, "By rms_mm alone it is not shown to be better (skill 0.400, its interval reaches -45.4) than "),
+    ],
+)
+def test_tips_that_lie_off_make_no_skill_certain(low: float, said: str) -> None:
+    row = {"rms_mm": 0.25, "skill_strongest": 0.4, "skill_strongest_low": low, "strongest_null": "roll_unknown"}
+    assert said in verdict(row | {"tip_median_mm": 1.5, "tip_along_median_mm": 1.5})
+
+
+@pytest.mark.parametrize(
     ("skill", "low", "said"),
     [
         (0.9, None, "skill 0.900 against the predictor 'least bending'"),
