@@ -14,12 +14,18 @@ UNITS_MM = {"cm": 10.0, "inch": 25.4, "m": 1000.0, "µm": 1e-3}
 """Units in which a length may have been given by mistake."""
 
 
-def unit_of(ratio: float, room: float) -> str:
-    """The unit in which a length is right that is ``ratio`` times too small in mm; empty for none.
+def other_units(stated: str = "mm") -> dict[str, float]:
+    """Factors by which lengths that were taken for ``stated`` grow where they are in another unit."""
+    units = {"mm": 1.0} | UNITS_MM
+    return {name: factor / units[stated] for name, factor in units.items() if name != stated}
+
+
+def unit_of(ratio: float, room: float, stated: str = "mm") -> str:
+    """The unit in which a length is right that is ``ratio`` times too small in the stated one; empty for none.
 
     room : how near log(ratio) must be to the logarithm of the unit's factor.
     """
-    return next((name for name, factor in UNITS_MM.items() if abs(np.log(ratio / factor)) < room), "")
+    return next((name for name, factor in other_units(stated).items() if abs(np.log(ratio / factor)) < room), "")
 
 
 def at_arc(curve_mm: ArrayLike, arc_mm: ArrayLike) -> Array:

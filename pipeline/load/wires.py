@@ -32,7 +32,7 @@ class OtherFile:
     """A frame's wire as it was read. points_mm : (n, 3) LPS, or None where ``problem`` says why there is none.
 
     missing : the simulator wrote nothing for the frame.     unclear : nobody says what its numbers mean, or two say
-    different things.     where : the file with its folder, empty where there is none.
+    different things.     where : the file with its folder, empty where there is none.     unit : stated of its numbers.
     """
 
     name: str
@@ -41,6 +41,7 @@ class OtherFile:
     missing: bool = False
     unclear: bool = False
     where: str = ""
+    unit: str = "mm"
 
 
 def kind_of(path: Path) -> str:
@@ -118,7 +119,7 @@ def _read(path: Path, space: str, unit: str) -> OtherFile:
     # all readers but that of tables convert a file that states RAS by themselves
     turned = in_space == "RAS" and (OF_KIND[kind] is read_csv_points or not stated_in(path, kind)[0])
     factor = 1.0 if kind == ".mrk.json" else UNITS_MM[in_unit]  # the reader of .mrk.json converts units itself
-    return _checked(path.name, points * factor * (RAS_TO_LPS if turned else 1.0))
+    return replace(_checked(path.name, points * factor * (RAS_TO_LPS if turned else 1.0)), unit=in_unit)
 
 
 def _agreed(path: Path, kind: str, space: str, unit: str) -> tuple[str, str]:

@@ -8,7 +8,7 @@ from itertools import product
 
 import numpy as np
 
-from pipeline.arrays.polyline import UNITS_MM, angle_deg, at_arc, unit_of
+from pipeline.arrays.polyline import angle_deg, at_arc, other_units, unit_of
 from pipeline.model import Array, arc_length
 
 AT_ENTRY_MM = 5.0
@@ -22,6 +22,8 @@ STEP_BACK_MM, BACK = 0.05, -0.5
 ROUNDING_MM = 1e-3
 SAME = 0.15
 """How near log(depth / length) must be to the logarithm of a unit's factor for that unit to be suggested."""
+SHORTER = 0.5
+"""How much shorter the wire of the next deeper frame must be, over the difference of depths, to be in a wrong place."""
 MIRROR = np.array([-1.0, -1.0, 1.0])
 
 
@@ -41,15 +43,19 @@ def begun(points_mm: Array, entry_mm: Array, direction: Array) -> Array:
     return np.concatenate([places[nearest][None], rest[np.linalg.norm(rest - places[nearest], axis=1) > 0]])
 
 
-def oddity(points_mm: Array, entry_mm: Array, direction: Array) -> str:
-    """Why a wire cannot have been pushed in at this entry, and what would make it fit; empty where it can."""
+def oddity(points_mm: Array, entry_mm: Array, direction: Array, unit: str = "mm") -> str:
+    """Why a wire cannot have been pushed in at this entry, and what would make it fit; empty where it can.
+
+    unit : in which its numbers were stated to be, before they became mm.
+    """
     back = _turned_back(points_mm)
     if back:
         return f"it turns straight back at point {back}: are its points in order, or do they scatter?"
     wrong = _misplaced(points_mm, entry_mm, direction)
     if not wrong:
         return ""
-    found = next((name for name, other in _readings(points_mm) if not _misplaced(other, entry_mm, direction)), "")
+    readings = _readings(points_mm, unit)
+    found = next((name for name, other in readings if not _misplaced(other, entry_mm, direction)), "")
     return wrong + (f": it would if it were {found}" if found else "; check its coordinates")
 
 
@@ -76,21 +82,32 @@ def _misplaced(points_mm: Array, entry_mm: Array, direction: Array) -> str:
     return ""
 
 
-def _readings(points_mm: Array) -> Iterator[tuple[str, Array]]:
+def _readings(points_mm: Array, unit: str) -> Iterator[tuple[str, Array]]:
     """Other readings of the numbers (point order, RAS, units), each with the resulting points; fewest changes first."""
     orders = {"": points_mm, "read from its other end (tip first)": points_mm[::-1]}
     spaces = {"": np.ones(3), "RAS": MIRROR}
-    units = {"": 1.0} | {f"in {name}": factor for name, factor in UNITS_MM.items()}
+    stated = f", not in {unit}" * (unit != "mm")
+    units = {"": 1.0} | {f"in {name}{stated}": factor for name, factor in other_units(unit).items()}
     all_of_them = [tuple(zip(*named, strict=True)) for named in product(orders.items(), spaces.items(), units.items())]
     for names, (points, signs, factor) in sorted(all_of_them, key=lambda one: sum(map(bool, one[0]))):
         if any(names):
             yield " and ".join(filter(None, names)), points * signs * factor
 
 
-def not_to_depth(length_mm: float, depth_mm: float, tolerance_mm: float) -> str:
-    """Why a wire does not have this depth, with a guess at its unit; empty where it does."""
+def not_to_depth(length_mm: float, depth_mm: float, tolerance_mm: float, stated: str = "mm") -> str:
+    """Why a wire does not have this depth, with a guess at its unit; empty where it does. stated : see ``oddity``."""
     if abs(length_mm - depth_mm) <= tolerance_mm:
         return ""
-    unit = unit_of(depth_mm / max(length_mm, 1e-9), SAME)
+    unit = unit_of(depth_mm / max(length_mm, 1e-9), SAME, stated)
     hint = f"; is it in {unit}?" if unit else ""
     return f"it is {length_mm:.3g} mm long from the entry on, the frame {depth_mm:.2f} mm deep{hint}"
+
+
+def out_of_order(lengths_mm: Array, depths_mm: Array) -> list[tuple[int, int]]:
+    """Pairs of frames, each and the next deeper one, of which the deeper has the clearly shorter wire.
+
+    lengths_mm, depths_mm : (n,), NaN where a frame has none.
+    """
+    order = [int(n) for n in np.argsort(depths_mm, kind="stable") if np.isfinite(lengths_mm[n] + depths_mm[n])]
+    pairs = zip(order, order[1:], strict=False)
+    return [(a, b) for a, b in pairs if lengths_mm[a] - lengths_mm[b] > SHORTER * (depths_mm[b] - depths_mm[a]) > 0.0]

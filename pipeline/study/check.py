@@ -165,7 +165,7 @@ def _others_problems(case: Case, count: int) -> list[str]:
     except LoadError as error:
         return [str(error)]
     entry, direction = np.array(case.entry_mm), np.array(case.entry_direction)
-    wrong = [f.problem if f.points_mm is None else oddity(f.points_mm, entry, direction) for f in files]
+    wrong = [f.problem if f.points_mm is None else oddity(f.points_mm, entry, direction, f.unit) for f in files]
     if not files or not case.simulated.files or not all(wrong):
         return []
     shown = next((n for n, file in enumerate(files) if not file.missing), 0)

@@ -8,6 +8,7 @@ import re
 import shutil
 from collections.abc import Callable
 from pathlib import Path
+from typing import cast
 
 import h5py
 import numpy as np
@@ -21,7 +22,7 @@ from pipeline.load.geometry import LoadError, Source
 from pipeline.load.vtk import read_vtk_points
 from pipeline.load.wires import numbered_frames, read_wires
 from pipeline.model import arc_length
-from pipeline.simulate.others import begun, not_to_depth, oddity
+from pipeline.simulate.others import begun, not_to_depth, oddity, out_of_order
 from pipeline.status import InputError
 from pipeline.study.others import named
 from reports.export import write_markups_curve, write_polyline_vtp
@@ -194,6 +195,33 @@ def nan(wire: Array) -> Array:
 def test_a_bad_wire_is_told_by_name(tmp_path: Path, spoil: Callable[[Array], Array], said: str) -> None:
     assert judged(made(), tmp_path / "good") == ""
     assert said in judged(spoil(made()), tmp_path / "bad")
+
+
+def test_a_unit_that_a_file_states_wrongly_is_told_as_it_is(tmp_path: Path) -> None:
+    """Numbers in mm under "unit: m" were "in µm"."""
+    folder = write_csv(tmp_path / "metres", [made()], "# space: LPS\n# unit: m\nx,y,z")
+    (found,) = read_wires([Source(folder / "wire_000.csv")], 1)
+    assert found.points_mm is not None
+    assert oddity(found.points_mm, ENTRY, ALONG, found.unit).endswith("it would if it were in mm, not in m")
+    assert not_to_depth(40e3, 40.0, 2.0, found.unit).endswith("is it in mm?")
+
+
+def test_wires_in_another_order_are_told() -> None:
+    """Neighbours that were swapped passed where frames lie nearer together than the tolerance of depths."""
+    depths = np.array([10.0, 11.5, 13.0, 14.5])
+    assert out_of_order(depths + [0.3, -0.2, 0.1, -0.6], depths) == []
+    assert out_of_order(depths[[1, 0, 3, 2]], depths) == [(0, 1), (2, 3)]
+    assert out_of_order(depths[::-1], depths) == [(0, 1), (1, 2), (2, 3)]
+    # frames may come in any order, and some have no wire
+    assert out_of_order(np.array([13.0, np.nan, 10.0]), np.array([13.0, 11.5, 10.0])) == []
+
+
+def test_a_score_of_swapped_wires_says_so(known: Known, tmp_path: Path) -> None:
+    wires = known[1]
+    folder = write_csv(tmp_path / "swapped", [wires[0], wires[1], wires[3], wires[2]])
+    _, _, result = run_with(known, f'"{folder}/*.csv"', "swapped")
+    (said,) = [text for text in map(str, cast(list[object], result["warnings"])) if "order" in text]
+    assert "is each file that of its frame?" in said
 
 
 def test_a_wire_begins_at_the_clamps_plane() -> None:

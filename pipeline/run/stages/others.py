@@ -12,7 +12,7 @@ from pipeline.model import Array, OtherWire, arc_length
 from pipeline.run.stages.known import Context, Frame, Known
 from pipeline.run.stages.own_curves import rough
 from pipeline.simulate import wall_of
-from pipeline.simulate.others import MIRROR, begun, not_to_depth, oddity
+from pipeline.simulate.others import MIRROR, begun, not_to_depth, oddity, out_of_order
 from pipeline.status import FrameStatus
 from reports.case_files import counted
 
@@ -34,6 +34,7 @@ def frames_of_others(run: Context, known: Known) -> tuple[Frame, ...]:
     assert known.lumen is not None
     wires = {f.index: f.simulated.joints_mm for f in frames if f.simulated is not None}
     voxel_mm = float(min(known.lumen.distance.spacing_mm))
+    log.warnings += _in_another_order(frames)
     log.warnings += _outside(known, wires, case.wire.radius_mm)
     log.warnings += rough(wires, voxel_mm, "the simulated wires", "give a point every millimetre")
     return tuple(frames)
@@ -44,20 +45,36 @@ def _listed(files: Sequence[OtherFile]) -> str:
     return f"frame 0 is {names[0]}, frame {len(names) - 1} is {names[-1]}"
 
 
+def _in_another_order(frames: Sequence[Frame]) -> list[str]:
+    """A warning where wires get shorter from a frame to the next deeper one: files may be those of other frames."""
+    lengths = [np.nan if f.simulated is None else float(arc_length(f.simulated.joints_mm)[-1]) for f in frames]
+    found = out_of_order(np.array(lengths), np.array([f.depth_mm for f in frames]))
+    if not found:
+        return []
+    a, b = found[0]
+    what = (
+        f"{lengths[a]:.2f} mm long in frame {a}, {frames[a].depth_mm:.2f} mm deep, and {lengths[b]:.2f} mm in frame {b}"
+    )
+    return [
+        f"the wires are not in the order of the frames: {what}, {frames[b].depth_mm:.2f} mm deep ({len(found)} of "
+        f"{len(frames) - 1} steps are so); is each file that of its frame?"
+    ]
+
+
 def _taken(run: Context, known: Known, frame: Frame, file: OtherFile) -> Frame:
     assert known.clamp is not None
     case, clamp = run.case, known.clamp
     if file.points_mm is None:
         status = FrameStatus.CURVE_MISSING if file.missing else FrameStatus.CURVE_UNUSABLE
         return frame.failed("simulate", status, f"{file.name}: {file.problem}")
-    odd = oddity(file.points_mm, np.array(case.entry_mm), np.array(case.entry_direction))
+    odd = oddity(file.points_mm, np.array(case.entry_mm), np.array(case.entry_direction), file.unit)
     if odd:
         return frame.failed("simulate", FrameStatus.CURVE_UNUSABLE, f"{file.name}: {odd}")
     points = begun(file.points_mm, clamp.entry_mm, clamp.direction)
     deepest = float(_clearance(known, points).max()) + case.wire.radius_mm
     found = replace(frame, simulated=OtherWire(points, max(deepest, 0.0)))
     length = float(arc_length(points)[-1])
-    wrong = not_to_depth(length, frame.depth_mm, run.config.trace.length_tolerance_mm)
+    wrong = not_to_depth(length, frame.depth_mm, run.config.trace.length_tolerance_mm, file.unit)
     return found.failed("simulate", FrameStatus.NOT_TO_DEPTH, f"{file.name}: {wrong}") if wrong else found
 
 
