@@ -1,5 +1,6 @@
 """What a page says first: the verdict in a sentence, the worst frames, the command that comes next."""
 
+import re
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
 from math import inf, isnan, nan
@@ -191,7 +192,18 @@ def _against(statistics: Mapping[str, Any]) -> str:
         NOT_SHOWN: f"It is not shown to be better ({unsure})",
     }
     how = said.get(standing(statistics), f"That is better ({value})")
-    return " ".join(filter(None, (f"{how} than {rival}.", _of_frames(statistics))))
+    few = _few_insertions(statistics) if least <= 0.0 < skill else ""
+    return " ".join(filter(None, (f"{how} than {rival}.", few, _of_frames(statistics))))
+
+
+def _few_insertions(statistics: Mapping[str, Any]) -> str:
+    """Whose doing it is that an interval over few insertions is wide: not the wire's alone."""
+    count = re.search(r"wide: (\d+) insertions", str(statistics.get("interval")))
+    return (
+        f"Intervals over {count[1]} insertions are wide: a perfect wire may have such a one; scan more."
+        if count
+        else ""
+    )
 
 
 def _of_frames(statistics: Mapping[str, Any]) -> str:

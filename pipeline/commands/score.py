@@ -91,6 +91,7 @@ def _plans(args: argparse.Namespace) -> "dict[str, Plan]":
     from pipeline.status import UsageError
     from pipeline.study.manifest import Manifest, read_manifest
     from pipeline.study.others import Others, found_for, named
+    from reports.simulators import folders_in
     from reports.verdict import OURS
 
     manifest, settings = read_manifest(file_of(args.manifest)), resolved_settings(args)
@@ -98,12 +99,16 @@ def _plans(args: argparse.Namespace) -> "dict[str, Plan]":
         raise UsageError([f"-j {args.jobs}: expected 1 or more"])
     if args.out.exists() and any(args.out.iterdir()) and not (args.out / "simulators").is_dir():
         raise UsageError([f"-o {args.out}: it is not empty and holds no score; name another folder"])
+    names = named(args.curves)
+    if not args.fresh and (lost := [name for name in folders_in(args.out) if name not in (*names, OURS)]):
+        what = f"it holds a score of {', '.join(lost)}, which would be replaced"
+        raise UsageError([f"-o {args.out}: {what}; name another folder, name them again with --curves, or --fresh"])
     calibrated, notes = as_calibrated(manifest.cases, args.parameters, own=args.score_used)
     manifest = Manifest(manifest.path, calibrated)
     plans: dict[str, Plan] = {}
     alone = len(manifest.cases) == 1
     stated = {"space": args.space, "unit": args.unit}
-    for name, place in {**named(args.curves), OURS: None}.items():
+    for name, place in {**names, OURS: None}.items():
         cases = []
         for case in calibrated:
             files = None if place is None else found_for(case.id, place, alone)

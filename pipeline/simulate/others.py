@@ -4,7 +4,7 @@ Their depth is counted as the solver's: along the wire, from the plane through t
 """
 
 from collections.abc import Iterator
-from itertools import product
+from itertools import pairwise, product
 
 import numpy as np
 
@@ -109,5 +109,8 @@ def out_of_order(lengths_mm: Array, depths_mm: Array) -> list[tuple[int, int]]:
     lengths_mm, depths_mm : (n,), NaN where a frame has none.
     """
     order = [int(n) for n in np.argsort(depths_mm, kind="stable") if np.isfinite(lengths_mm[n] + depths_mm[n])]
-    pairs = zip(order, order[1:], strict=False)
-    return [(a, b) for a, b in pairs if lengths_mm[a] - lengths_mm[b] > SHORTER * (depths_mm[b] - depths_mm[a]) > 0.0]
+    return [
+        (a, b)
+        for a, b in pairwise(order)
+        if lengths_mm[a] - lengths_mm[b] > SHORTER * (depths_mm[b] - depths_mm[a]) > 0.0
+    ]

@@ -16,6 +16,7 @@ from pipeline.load.order import natural_key
 from pipeline.load.slices import is_dicom, is_multiframe
 from pipeline.model import Array, Volume, Wall
 
+NO_REFERENCE = "reference: none found (a file named reference.*); --reference names a scan without the wire"
 REFERENCE_NAMES = ("reference", "ref", "wire_free", "nowire", "empty")
 DEFAULT_RADIUS_MM = 0.18
 AT_EDGE = "the end of the wire nearest to the edge of the first frame"
@@ -192,7 +193,7 @@ def infer_manifest(
         raise unusable(folder, f"found {found}; allowed: {allowed}{_deeper(folder)}")
     seen = (
         f"frames: {len(frames)} scans in natural order, {frames[0].name} to {frames[-1].name}",
-        f"reference: {reference.name}" if reference else "reference: none found (a file named reference.*)",
+        f"reference: {reference.name}" if reference else NO_REFERENCE,
         *(f"left out: {path.name}, named as a scan without wire" for path in left_out),
     )
     entry, direction, where = _stated_or_seen(entry, direction, frames, reference, config)

@@ -39,8 +39,25 @@ def _oddities(wire: Wire) -> Iterator[str]:
             f"rubber) to {largest:.3g} N mm2 (of tungsten), and guide wires lie between; is it in another unit, or the "
             "radius wrong?"
         )
+    heaviest = HEAVIEST_N_MM3 * np.pi * radius**2
+    if wire.weight_N_per_mm > heaviest:
+        yield (
+            f"weight_N_per_mm = {wire.weight_N_per_mm:.3g}: a rod of tungsten of radius_mm = {radius:g} weighs "
+            f"{heaviest:.2g} N/mm; is it in another unit?"
+        )
+    profile = np.atleast_2d(wire.bending_stiffness_N_mm2)
+    tip, shaft = float(profile[0, -1]), float(profile[-1, -1])
+    if tip > STIFFER_TIP * shaft:
+        yield (
+            f"bending_stiffness_N_mm2 is {tip:g} at the tip and {shaft:g} at its far end: guide wires are softest at "
+            "the tip; profiles count from the tip, is it turned round?"
+        )
 
 
+HEAVIEST_N_MM3 = 2.0e-4
+"""Weight of tungsten or platinum, 19.3 to 21.5 g/cm3, a fluid's lift left out."""
+STIFFER_TIP = 1.5
+"""How much stiffer than its far end the tip is at least where it is doubted."""
 SHORT_WAY = 0.5
 """Share of the largest stated depth that the scan holds ahead of the entry at least; a vessel may turn."""
 SHORT_MM = 10.0

@@ -150,12 +150,15 @@ def test_a_clamp_cannot_be_borrowed_from_nowhere_or_in_a_ring(tmp_path: Path) ->
         (("[[0.0, 0.5], [30.0, 5.0]]", "0.005"), "bending_stiffness_N_mm2 of 0.005"),
         (("radius_mm = 0.18", "radius_mm = 0.89"), "radius_mm = 0.89: guide wires have 0.1 to 0.5 mm; is it the diam"),
         (("radius_mm = 0.18", "radius_mm = 0.007"), "radius_mm = 0.007: guide wires have 0.1 to 0.5 mm; is it in an"),
+        (("[[0.0, 0.5], [30.0, 5.0]]", "[[0.0, 5.0], [30.0, 0.5]]"), "bending_stiffness_N_mm2 is 5 at the tip and 0.5"),
+        (("[30.0, 5.0]]", "[30.0, 5.0]]\nweight_N_per_mm = 7e-3"), "weight_N_per_mm = 0.007: a rod of"),
     ],
 )
 def test_a_wire_in_another_unit_is_a_warning(tmp_path: Path, change: tuple[str, str], said: str) -> None:
     """EI a thousand times too large, or a diameter of 0.035 inch as the radius, ran without a word."""
     assert implausible(read_manifest(written(tmp_path, GOOD)).cases) == []
-    notes = implausible(read_manifest(written(tmp_path, GOOD.replace(*change))).cases)
+    text = GOOD.replace(*change).replace('wire = "soft"', 'wire = "soft"\ndown = [0, 0, 1]')
+    notes = implausible(read_manifest(written(tmp_path, text)).cases)
     assert f"wire 'soft': {said}" in notes[0]
 
 

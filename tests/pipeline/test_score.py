@@ -368,6 +368,18 @@ def test_where_curves_are_looked_for(known: Known, tmp_path: Path, capsys: pytes
         assert heard.endswith("1 problem in the command line; nothing was run\n"), "it was in the manifest"
 
 
+def test_a_score_of_others_is_not_replaced(known: Known, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The same command with another --curves put its results in the place of the first ones."""
+    one, two = write_csv(tmp_path / "one", known[1]), write_csv(tmp_path / "two", known[1])
+    words = ["score", str(known[0]), "-o", str(tmp_path / "out"), *QUICK]
+    assert main([*words, "--curves", str(one)]) == 0
+    kept = (tmp_path / "out" / "simulators.csv").read_bytes()
+    assert main([*words, "--curves", str(two)]) == 2
+    assert "holds a score of one, which would be replaced; name another folder" in capsys.readouterr().err
+    assert (tmp_path / "out" / "simulators.csv").read_bytes() == kept
+    assert main([*words, "--curves", str(one), "--curves", str(two)]) == 0
+
+
 @pytest.mark.parametrize("names", [("sofa", "SOFA"), ("Wireval",)])
 def test_names_that_a_disk_may_not_tell_apart_are_refused(names: tuple[str, ...]) -> None:
     with pytest.raises(InputError, match=r"is taken|not 'wireval'"):

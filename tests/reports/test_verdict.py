@@ -242,3 +242,11 @@ def test_cases_that_are_worse_than_a_guess_are_named() -> None:
     assert worse_sentence([row, worse | {"skill_strongest": -0.05}]) == "", "that is no better, and not worse"
     assert worse_sentence([row, worse | {"role": "calibration"}]) == ""
     assert worse_sentence([worse]) == "", "all else on the page speaks of this case"
+
+
+def test_a_wide_interval_is_said_to_be_the_doing_of_few_insertions() -> None:
+    """With three insertions a wire of a fifth of the error of the best guess was "not shown to be better"."""
+    row = {"rms_mm": 0.085, "skill_strongest": 0.96, "strongest_null": "another", "skill_strongest_low": -3.2}
+    assert "Intervals over 3 insertions are wide" in verdict(row | {"interval": "wide: 3 insertions"})
+    assert "are wide" not in verdict(row | {"interval": "over 8 insertions"})
+    assert "are wide" not in verdict(row | {"interval": "wide: 3 insertions", "skill_strongest_low": 0.4})
