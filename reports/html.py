@@ -118,7 +118,7 @@ def render_index(out_dir: Path, embed: bool = False, each: Each = one_by_one) ->
     mixed, cases_said = mixed_settings(out_dir), zip(summary["role"], summary["status"], strict=True)
     why_none = mixed or unscored(cases_said) or not_reached(out_dir)
     page = {
-        **_headline(cases, _status(out_dir, failures, mixed), row, missing, damaged),
+        **_headline(cases, _status(out_dir, [f for f in failures if not _of_another(f)], mixed), row, missing, damaged),
         **_worse_cases(summary, links),
         "verdict": verdict(row, _simulator(cases)) or why_none,
         "worst": worst_frames({n: t for n, t in errors.items() if n not in uncounted}, links),
@@ -204,7 +204,7 @@ def _run_failures(out_dir: Path, cases: list[CaseFiles], links: dict[str, str]) 
     whose pages lie beside their logs."""
     table = read_if_there(out_dir / FAILURES.file, FAILURES)
     rows: list[dict[Any, Any]] = table.astype(object).where(table.notna(), "").to_dict("records")
-    beside = [row for row in rows if row["log"].startswith("simulators/")]
+    beside = [row for row in rows if _of_another(row)]
     # the page finds out itself what it cannot read
     own = [row for row in rows if row not in beside and row["status"] != "damaged"]
     known = {row["case"] for row in own}
@@ -214,6 +214,11 @@ def _run_failures(out_dir: Path, cases: list[CaseFiles], links: dict[str, str]) 
     pages = [Path(row["log"]).with_name("report.html") for row in beside]
     theirs = [row | {"link": quote(str(p)) * (out_dir / p).exists()} for row, p in zip(beside, pages, strict=True)]
     return [*(row | {"link": links.get(row["case"], "")} for row in own), *theirs]
+
+
+def _of_another(failure: Mapping[Any, Any]) -> bool:
+    """Whether a failure is of another simulator of a score, and no fault of the one whose page it stands on."""
+    return str(failure.get("log", "")).startswith("simulators/")
 
 
 def readable_cases(out_dir: Path) -> tuple[list[CaseFiles], list[dict[str, Any]]]:

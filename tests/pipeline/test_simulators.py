@@ -189,6 +189,7 @@ def test_report_makes_every_table_of_a_score_again(tmp_path: Path, capsys: pytes
     page = (tmp_path / "index.html").read_text(encoding="utf-8")
     assert "Failures: 1 frame<" in page
     assert "bad: c1" in page
+    assert ">failures</span>" not in page, "the badge is of the wires that the page is of, and they have none"
     assert "side by side" in capsys.readouterr().out
 
 
