@@ -76,18 +76,19 @@ def test_an_insertion_is_left_out_of_the_guesses_made_of_it() -> None:
     np.testing.assert_allclose(without_each(frames, squares, nulls), expected, rtol=1e-12, atol=0)
 
 
-def test_guesses_that_all_hang_on_one_insertion_have_no_interval() -> None:
+@pytest.mark.parametrize("count", [intervals.FEWEST, 4])
+def test_guesses_that_all_hang_on_one_insertion_have_no_interval(count: int) -> None:
     """Left out, it leaves no frame; taken as a ratio of 1, that gave a skill of 0.990 an interval from -5943."""
     draw, frames = np.random.default_rng(6), list[Scored]()
-    for name, other in (("a", "b"), ("b", "a"), ("c", "a"), ("d", "a")):
+    for name, other in (("a", "b"), ("b", "a"), ("c", "a"), ("d", "a"))[:count]:
         for _ in range(3):
             row = {"status": "ok", "tip_mm": 0.1, "null_centreline_rms_mm": 2.0, "null_another_rms_mm": 1.0}
             frames.append(Scored(row, 0.1 * draw.random(6), np.arange(6) / 2, name, {other: (6.0, 6)}))
     result = pooled(frames)
-    assert (result["strongest_null"], result["strongest_insertions"]) == ("another", 4)
+    assert (result["strongest_null"], result["strongest_insertions"]) == ("another", count)
     assert np.isnan([result["skill_strongest_low"], result["skill_strongest_high"]]).all()
     withheld = "skill_strongest interval withheld: without a no frame has a guess"
-    assert result["interval"] == f"wide: 4 insertions; {withheld}"
+    assert result["interval"] == f"wide: {count} insertions; {withheld}"
     frames.append(frames[-1]._replace(guesses={"b": (6.0, 6)}))
     assert pooled(frames)["skill_strongest_low"] < pooled(frames)["skill_strongest"]
 
