@@ -138,6 +138,8 @@ FOOT_MM = 1e-9
 RIDGE_BEND = 0.5
 """Fall of the distance's slope over a voxel from which on a place with little slope is on a ridge: there it falls by up
 to 2, at a carina's edge by less than it rises in the other direction, and round a vessel's own axis it rises."""
+RIDGE_SLOPE = 0.1
+"""Slope across a ridge below which a place lies on it: a twentieth of a voxel aside it has that much."""
 RIDGE_VOXELS = 0.05
 """Rise of the distance above both ends of a way, in voxels, that is a ridge: the chord of a foot's move along a wall
 that curves with two voxels of radius rises by a fifteenth of that."""

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from solver import _tolerances as tol
-from solver._kernels.algebra import Three, dot, load3, minus, mix
+from solver._kernels.algebra import Six, Three, apply, dot, full, load3, minus, mix
 from solver._kernels.data import Field
 from solver._kernels.field import clipped, indices, jet_at, locate, value
 from solver._kernels.flags import cached, inlined, kernel, owner
@@ -43,7 +43,7 @@ def through_wall(field: Field, x: Any, k: int, margin: float) -> bool:
             q = mix(1.0 - i / steps, a, i / steps, b)
             v = distance(field, q)
             room = level - v
-            here = (q[0], q[1], q[2], v) if room >= 0.0 else foot(field, q, v, level)
+            here = (q[0], q[1], q[2], v) if room >= 0.0 else foot(field, q, v, level, n == k and i == steps)
             if here[3] < math.inf:
                 # a wire that stays in its lumen is its own foot
                 stays = not known or (inside and room >= 0.0)
@@ -96,8 +96,11 @@ def distance(field: Field, q: Three) -> float:
 
 
 @kernel
-def foot(field: Field, q: Three, v: float, level: float) -> Foot:
-    """Go down the distance from a place, where it is v, to ``level``, mm, or to where a narrower lumen is deepest."""
+def foot(field: Field, q: Three, v: float, level: float, any_side: bool) -> Foot:
+    """Go down the distance from a place, where it is v, to ``level``, mm, or to where a narrower lumen is deepest.
+
+    any_side : take a place on a ridge to either side, as for the tip, which would creep along it; else it has no foot.
+    """
     c = field.coefficients
     for n in range(tol.FOOT_STEPS):
         if v <= level + tol.FOOT_MM:
@@ -112,8 +115,8 @@ def foot(field: Field, q: Three, v: float, level: float) -> Foot:
         floor = even and bends > 0.0
         if floor and v < 0.5 * field.spacing:
             break
-        # a place on a ridge belongs to neither side: it would slide along to the edge, where the two meet
-        if n == 0 and even and bends * field.spacing < -tol.RIDGE_BEND:
+        ridge = n == 0 and even and bends * field.spacing < -tol.RIDGE_BEND
+        if ridge and not any_side and on_ridge(g, second, bends):
             v = math.inf
             break
         step = min((v - level) / max(square, 1e-12), 0.5 * field.spacing / math.sqrt(max(square, 1e-12)))
@@ -124,6 +127,16 @@ def foot(field: Field, q: Three, v: float, level: float) -> Foot:
             break
         q, v = lower, w
     return q[0], q[1], q[2], v
+
+
+@inlined
+def on_ridge(slope: Three, second: Six, bends: float) -> bool:
+    """Whether a place lies on a ridge, and belongs to neither side: down the distance it would slide to the edge.
+
+    second : derivatives of the distance; their trace, ``bends``, is that across the ridge but for little.
+    """
+    across = apply(full(second), slope)
+    return bool(dot(across, across) < (tol.RIDGE_SLOPE * bends) ** 2)
 
 
 @kernel
@@ -191,5 +204,5 @@ def apart(a: Three, b: Three) -> float:
 @kernel
 def deeper(field: Field, a: Foot) -> Three:
     """A place up to a voxel deeper in the lumen than a foot: a flood fill from there cannot slip over a ridge."""
-    b = foot(field, a[:3], distance(field, a[:3]), a[3] - field.spacing)
+    b = foot(field, a[:3], distance(field, a[:3]), a[3] - field.spacing, True)
     return b[:3] if b[3] < math.inf else a[:3]
