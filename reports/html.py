@@ -184,8 +184,9 @@ def _case_verdict(case: CaseFiles) -> str:
         became = f"{good} of {counted(planned, 'frame')} have a result."
     scored = _scored(case)
     how = verdict(scored, case.simulator) if scored or not case.statistics else OF_CALIBRATION
-    alone = " The predictor 'another insertion' may be stronger; it is judged over the run, on its first page."
-    return " ".join(filter(None, (became, how))) + alone * bool(how and str(scored.get("strongest_null", "")))
+    judged = bool(how) and _content.number(scored.get("skill_strongest")) != _content.NOTHING
+    alone = "The predictor 'another insertion' may be stronger; it is judged over the run, on its first page." * judged
+    return " ".join(filter(None, (became, how, alone)))
 
 
 def _scored_or_ok(cases: Sequence[CaseFiles]) -> str:

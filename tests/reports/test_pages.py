@@ -358,6 +358,16 @@ def test_a_case_that_is_worse_than_a_guess_is_marked_and_named(tmp_path: Path) -
     assert "only marked rows" in page
 
 
+@pytest.mark.parametrize(("skill", "said"), [(0.9, True), (None, False)])
+def test_a_case_page_says_who_is_judged_over_the_run_alone(tmp_path: Path, skill: float | None, said: bool) -> None:
+    """Beside a skill of the case, and nowhere else: an empty field is no predictor."""
+    folder = write_run(tmp_path / "out", (FakeCase("a", 3),)) / "cases" / "a"
+    result = json.loads((folder / "result.json").read_text(encoding="utf-8"))
+    result["summary"] |= {"skill_strongest": skill, "strongest_null": "previous" if skill else None}
+    (folder / "result.json").write_text(json.dumps(result), encoding="utf-8")
+    assert ("it is judged over the run" in render_case(folder).read_text(encoding="utf-8")) == said
+
+
 def test_a_scan_that_the_roll_was_fitted_on_is_no_frame_that_is_ok(tmp_path: Path) -> None:
     """Six scans were "Every frame is ok" and "5 frames: 5 ok"."""
     out = write_run(tmp_path / "out", (FakeCase("a", 5),))
