@@ -34,9 +34,9 @@ Row = tuple[Any, ...]
 class Difference:
     """rows: (simulator, of scores,) case, frame, column, before, after, change, allowed, verdict.
 
-    verdict : same, within, better, regression, moved (a value that has no better side, by more than allowed), or new
-    (only the second run has it; of a frame, ``after`` is its status).     empty : cases of which the first run has no
-    number to hold against.
+    verdict : same, within, better, regression, moved (a value that has no better side, by more than allowed, or a
+    column that the second run has in no frame), or new (only the second run has it; of a frame, ``after`` is its
+    status).     empty : cases of which the first run has no number to hold against.
     """
 
     rows: pd.DataFrame

@@ -1,6 +1,5 @@
 """What a page says first: the verdict in a sentence, the worst frames, the command that comes next."""
 
-import re
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
 from math import inf, isnan, nan
@@ -14,6 +13,7 @@ from reports.case_files import WORST, counted, listed, read_json, results_in, sa
 from reports.schema import SUMMARY
 
 _MANY = 5
+_WIDE = "wide: "  # how the note on an interval over few insertions begins
 _NOT_AGAIN = "--only", "--case-timeout", "--case-memory"
 """Options that the next command leaves out: other cases are meant, and a limit that stopped one stops it again."""
 
@@ -198,12 +198,10 @@ def _against(statistics: Mapping[str, Any]) -> str:
 
 def _few_insertions(statistics: Mapping[str, Any]) -> str:
     """Whose doing it is that an interval over few insertions is wide: not the wire's alone."""
-    count = re.search(r"wide: (\d+) insertions", str(statistics.get("interval")))
-    return (
-        f"Intervals over {count[1]} insertions are wide: a perfect wire may have such a one; scan more."
-        if count
-        else ""
-    )
+    told = str(statistics.get("interval")).partition("; ")[0]
+    if not told.startswith(_WIDE):
+        return ""
+    return f"Intervals over {told.removeprefix(_WIDE)} are wide: a perfect wire may have such a one; scan more."
 
 
 def _of_frames(statistics: Mapping[str, Any]) -> str:

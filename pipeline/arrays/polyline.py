@@ -10,14 +10,13 @@ from pipeline.model import Array, arc_length
 
 SAME_MM = 1e-6
 """Arc lengths closer than this are one."""
-UNITS_MM = {"cm": 10.0, "inch": 25.4, "m": 1000.0, "µm": 1e-3}
+UNITS_MM = {"mm": 1.0, "cm": 10.0, "inch": 25.4, "m": 1000.0, "µm": 1e-3}
 """Units in which a length may have been given by mistake."""
 
 
 def other_units(stated: str = "mm") -> dict[str, float]:
     """Factors by which lengths that were taken for ``stated`` grow where they are in another unit."""
-    units = {"mm": 1.0} | UNITS_MM
-    return {name: factor / units[stated] for name, factor in units.items() if name != stated}
+    return {name: factor / UNITS_MM[stated] for name, factor in UNITS_MM.items() if name != stated}
 
 
 def unit_of(ratio: float, room: float, stated: str = "mm") -> str:

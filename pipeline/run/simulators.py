@@ -111,12 +111,11 @@ def _alone(name: str, found: Sequence[Found], common: Frames) -> dict[str, Any]:
     """
     used = validation(found)
     planned = {"frames": sum(case.result.frame_count for case in used), "frames_ok": 0, "within_1mm": 0.0}
-    planned["common_frames"] = len(common)
     alike = [
         replace(c, frames={n: frame for n, frame in c.frames.items() if (c.result.case, n) in common}) for c in used
     ]
     own, skill = overall(found), overall(alike)
-    row = planned | own | {key: skill.get(key) for key in OF_SKILL if own}
+    row = planned | own | {key: skill.get(key) for key in OF_SKILL if own} | {"common_frames": len(common)}
     return {key: value for key, value in row.items() if key in SIMULATORS.names} | {"simulator": name}
 
 

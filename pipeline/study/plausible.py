@@ -18,6 +18,11 @@ SOFTEST_GPA, STIFFEST_GPA = 0.1, 400.0
 inch were measured at 9.5 to 158 GPa (Harrison et al., J Endovasc Ther 18, 2011, doi 10.1583/11-3592.1); the wires of
 the catalogue have 4.9. A factor of 1000 takes any of them out of this range."""
 
+HEAVIEST_N_MM3 = 2.0e-4
+"""Weight of tungsten or platinum, 19.3 to 21.5 g/cm3, a fluid's lift left out."""
+STIFFER_TIP = 1.5
+"""How much stiffer than its far end the tip is at least where it is doubted."""
+
 
 def implausible(cases: Iterable[Case]) -> list[str]:
     """Sentences on the wires of these cases, a wire of several cases once."""
@@ -29,7 +34,8 @@ def _oddities(wire: Wire) -> Iterator[str]:
     if not thinnest <= radius <= thickest:
         what = "is it the diameter, or in another unit?" if radius > thickest else "is it in another unit?"
         yield f"radius_mm = {radius:g}: guide wires have {thinnest:g} to {thickest:g} mm; {what}"
-    most = float(np.max(np.atleast_2d(wire.bending_stiffness_N_mm2)[:, -1]))
+    profile = np.atleast_2d(wire.bending_stiffness_N_mm2)[:, -1]
+    tip, shaft, most = float(profile[0]), float(profile[-1]), float(profile.max())
     of_1_gpa = 1000.0 * 0.25 * np.pi * radius**4
     modulus = most / of_1_gpa
     if not SOFTEST_GPA <= modulus <= STIFFEST_GPA:
@@ -45,8 +51,6 @@ def _oddities(wire: Wire) -> Iterator[str]:
             f"weight_N_per_mm = {wire.weight_N_per_mm:.3g}: a rod of tungsten of radius_mm = {radius:g} weighs "
             f"{heaviest:.2g} N/mm; is it in another unit?"
         )
-    profile = np.atleast_2d(wire.bending_stiffness_N_mm2)
-    tip, shaft = float(profile[0, -1]), float(profile[-1, -1])
     if tip > STIFFER_TIP * shaft:
         yield (
             f"bending_stiffness_N_mm2 is {tip:g} at the tip and {shaft:g} at its far end: guide wires are softest at "
@@ -54,10 +58,6 @@ def _oddities(wire: Wire) -> Iterator[str]:
         )
 
 
-HEAVIEST_N_MM3 = 2.0e-4
-"""Weight of tungsten or platinum, 19.3 to 21.5 g/cm3, a fluid's lift left out."""
-STIFFER_TIP = 1.5
-"""How much stiffer than its far end the tip is at least where it is doubted."""
 SHORT_WAY = 0.5
 """Share of the largest stated depth that the scan holds ahead of the entry at least; a vessel may turn."""
 SHORT_MM = 10.0

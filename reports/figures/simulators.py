@@ -1,6 +1,5 @@
 """Several simulators side by side: error along the wire and over depth, and who is nearest where."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import cycle
 
@@ -10,14 +9,12 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_hex, to_rgb
 
 from reports.colours import SIMULATED
-from reports.figures._drawing import Array, Drawing, legend, new_figure, plain, positive_axis
+from reports.figures._drawing import Drawing, legend, new_figure, plain, positive_axis
 from reports.figures._style import PALETTE
 from reports.verdict import OURS, TIPS_OFF
 
 _FAINT = 0.3  # of a lead that is not clear
-_SHADES: tuple[Callable[[Array], Array], ...] = (
-    lambda colour: colour, lambda colour: 0.5 * colour, lambda colour: 0.5 + 0.5 * colour,
-)  # fmt: skip
+_SHADES = ((0.0, 1.0), (0.0, 0.5), (0.5, 0.5))  # white that is added, share of the colour that is kept
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,8 +32,8 @@ def leads(where: pd.DataFrame) -> pd.DataFrame:
 
 def colours(names: "pd.Series[str]") -> dict[str, str]:
     """The solver's own in its colour, every other simulator in one of its own; beyond fifteen they repeat."""
-    shades = (shade(np.array(to_rgb(colour))).tolist() for shade in _SHADES for colour in PALETTE[1:])
-    spare = cycle(to_hex(tuple(colour)) for colour in shades)
+    shades = (white + kept * np.array(to_rgb(colour)) for white, kept in _SHADES for colour in PALETTE[1:])
+    spare = cycle(to_hex(tuple(shade.tolist())) for shade in shades)
     return {name: SIMULATED if name == OURS else next(spare) for name in dict.fromkeys(names)}
 
 

@@ -32,8 +32,7 @@ def through_wall(field: Field, x: Any, k: int, margin: float) -> bool:
     level, last, known, inside = -margin, (0.0, 0.0, 0.0, 0.0), False, False
     for n in range(1, k + 1):
         a, b = load3(x, n - 1), load3(x, n)
-        d = minus(b, a)
-        way = math.sqrt(dot(d, d))
+        way = apart(a, b)
         if not near_crease(field, a, b, way):
             known = False
             continue
@@ -46,8 +45,7 @@ def through_wall(field: Field, x: Any, k: int, margin: float) -> bool:
             here = (q[0], q[1], q[2], v) if room >= 0.0 else foot(field, q, v, level, n == k and i == steps)
             if here[3] < math.inf:
                 # a wire that stays in its lumen is its own foot
-                stays = not known or (inside and room >= 0.0)
-                if not stays and parted(field, last, here, level):
+                if known and not (inside and room >= 0.0) and parted(field, last, here, level):
                     return True
                 last, known, inside = here, True, room >= 0.0
             # skip the places that must be inside as well, since the distance's slope is bounded
@@ -58,9 +56,8 @@ def through_wall(field: Field, x: Any, k: int, margin: float) -> bool:
 @kernel
 def passes_crease(field: Field, x: Any, k: int) -> bool:
     """Whether a wire comes near a crease anywhere; so few joints are tested that most wires cost next to nothing."""
-    d = minus(load3(x, k), load3(x, k - 1))
     # all segments but the first, which has up to half a segment more, are as long as the last one
-    stride = int(0.75 * tol.CREASE_BLOCK * field.spacing / math.sqrt(dot(d, d)))
+    stride = int(0.75 * tol.CREASE_BLOCK * field.spacing / apart(load3(x, k - 1), load3(x, k)))
     if stride < 1:
         return True
     found = False

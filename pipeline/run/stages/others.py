@@ -51,13 +51,10 @@ def _in_another_order(frames: Sequence[Frame]) -> list[str]:
     found = out_of_order(np.array(lengths), np.array([f.depth_mm for f in frames]))
     if not found:
         return []
-    a, b = found[0]
-    what = (
-        f"{lengths[a]:.2f} mm long in frame {a}, {frames[a].depth_mm:.2f} mm deep, and {lengths[b]:.2f} mm in frame {b}"
-    )
+    here, deeper = (f"{lengths[n]:.2f} mm long in frame {n}, {frames[n].depth_mm:.2f} mm deep" for n in found[0])
     return [
-        f"the wires are not in the order of the frames: {what}, {frames[b].depth_mm:.2f} mm deep ({len(found)} of "
-        f"{len(frames) - 1} steps are so); is each file that of its frame?"
+        f"the wires are not in the order of the frames: {here}, and {deeper} ({len(found)} of {len(frames) - 1} steps "
+        "are so); is each file that of its frame?"
     ]
 
 
