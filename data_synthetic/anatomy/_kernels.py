@@ -142,12 +142,12 @@ def tube_distance(p: Vector, t: int, limit: float, tubes: TubeTables) -> tuple[f
 
 
 @on_disk()
-def union_distance(p: Vector, tubes: TubeTables) -> tuple[float, float, float, float]:
-    """Signed distance of the smooth union and its gradient."""
+def union_distance(p: Vector, limit: float, tubes: TubeTables) -> tuple[float, float, float, float]:
+    """Signed distance of the smooth union and its gradient; tubes certainly above ``limit`` are not looked at."""
     value, gx, gy, gz = FAR, 0.0, 0.0, 0.0
     for t in range(len(tubes.steps)):
         k = tubes.blends[t]
-        f, nx, ny, nz = tube_distance(p, t, value + k, tubes)
+        f, nx, ny, nz = tube_distance(p, t, min(limit, value + k), tubes)
         if f >= value + k:
             continue
         if value >= f + k:
@@ -164,6 +164,6 @@ def union_distance(p: Vector, tubes: TubeTables) -> tuple[float, float, float, f
 def distances(points: Array, tubes: TubeTables, out: Array, gradients: Array) -> None:
     """Fill signed distances (n,) and their gradients (n, 3) at points (n, 3)."""
     for i in range(len(points)):
-        f, gx, gy, gz = union_distance((points[i, 0], points[i, 1], points[i, 2]), tubes)
+        f, gx, gy, gz = union_distance((points[i, 0], points[i, 1], points[i, 2]), FAR, tubes)
         out[i] = f
         gradients[i, 0], gradients[i, 1], gradients[i, 2] = gx, gy, gz

@@ -9,9 +9,10 @@ import pytest
 from scipy.ndimage import gaussian_filter1d
 
 from data_synthetic.anatomy.tubes import Anatomy, ball, sweep
+from data_synthetic.anatomy.willis import WillisPlan, circle_of_willis
 from data_synthetic.geometry import ScanGrid
 from data_synthetic.scanner import Greys, Phantom, PsfScanner
-from data_synthetic.scanner.coverage import bone_coverage, lumen_coverage, splat, wire_particles
+from data_synthetic.scanner.coverage import SUBSAMPLES, bone_coverage, lumen_coverage, splat, wire_particles
 from tests.data_synthetic.grids import centred_grid
 from tests.naive.tubes import inside_share
 
@@ -41,6 +42,21 @@ def test_coverage_of_each_voxel_is_the_share_inside(grid: ScanGrid, vessel: Anat
         centre = grid.to_mm(index)
         exact = inside_share(vessel.distance, centre - 0.15, centre + 0.15)
         assert abs(share[tuple(index)] - exact) < 0.05
+
+
+def test_coverage_looks_at_every_tube_that_counts() -> None:
+    """What the distance to all tubes gives, to the last digit of a float32, in a tree whose branches blend."""
+    tree = circle_of_willis(np.random.default_rng(3), WillisPlan())
+    middle = 0.5 * (tree.tables.points.min(axis=0) + tree.tables.points.max(axis=0))
+    grid = centred_grid(middle, (96, 96, 96), 0.9)
+    share = lumen_coverage(tree, grid)
+    index = np.argwhere((share > 0) & (share < 1))
+    assert len(index) > 2000
+    inside, steps = np.zeros(len(index)), 0.9 * ((np.arange(SUBSAMPLES) + 0.5) / SUBSAMPLES - 0.5)
+    for offset in np.stack(np.meshgrid(steps, steps, steps, indexing="ij"), axis=-1).reshape(-1, 3):
+        distance = tree.distance(grid.to_mm(index) + offset)
+        inside += np.clip(0.5 - distance / (0.9 / SUBSAMPLES), 0.0, 1.0) / SUBSAMPLES**3
+    np.testing.assert_allclose(share[tuple(index.T)], inside, rtol=0.0, atol=2e-7)
 
 
 def test_wire_keeps_its_volume(grid: ScanGrid) -> None:
