@@ -63,7 +63,7 @@ def splat(index: Array, weights: Array, sigma: Array, out: Volume) -> None:
 SUBSAMPLES = 4
 """Sub-voxels per axis where the wall crosses a voxel, the wall being a plane in each."""
 BLENDS = 2.0
-"""Widths of blending beyond which a tube changes nothing: with 2 and 4 every bit is the same, with 1 1e-6 of a voxel."""
+"""Widths of blending beyond which a tube changes no bit; with 1 it changes 4e-6 of a voxel."""
 
 
 @on_disk()

@@ -88,6 +88,39 @@ def test_the_row_over_all_rests_on_the_insertions(out: Path) -> None:
     assert pd.read_csv(out / "summary.csv")["rms_low_mm"].isna().all(), "a case is one insertion"
 
 
+@pytest.mark.parametrize(
+    ("stated", "wrong", "said"),
+    [
+        ("roll_deg = ", "roll_deg = 150.0 #", "turned by 210 degrees"),
+        (
+            "rest_curvature_per_mm = [[0.0, 0.12], [8.0, 0.12]",
+            "rest_curvature_per_mm = [[0.0, -0.12], [8.0, -0.12]",
+            "180",
+        ),
+        (
+            "wire = ",
+            "catheter = {bending_stiffness_N_mm2 = 60, radius_mm = 0.6, insertion_mm = [5, 15, 25, 35]}\nwire = ",
+            "catheter",
+        ),
+        ("entry_mm", "entry_mm", ""),
+    ],
+)
+def test_the_scans_speak_against_what_is_stated_wrongly(
+    study: Path, stated: str, wrong: str, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A catheter that no scan shows took the skill from 0.98 to 0.47 without a word."""
+    monkeypatch.setenv("WIREVAL_CACHE", str(tmp_path / "store"))
+    text = (study / "manifest.toml").read_text(encoding="utf-8")
+    assert stated in text
+    manifest = study / "wrong.toml"
+    manifest.write_text(text.replace(stated, wrong), encoding="utf-8")
+    assert main(["run", str(manifest), "-o", str(tmp_path / "out"), "--until", "compare", "-q", "--only", "bend"]) == 0
+    result = json.loads((tmp_path / "out" / "cases" / "bend" / "result.json").read_text(encoding="utf-8"))
+    found = [text for text in result["warnings"] if "as stated" in text]
+    assert len(found) == bool(said)
+    assert all(said in text for text in found), found
+
+
 def test_a_reference_in_another_format_is_of_the_same_phantom(
     study: Path, out: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

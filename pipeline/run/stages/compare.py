@@ -12,6 +12,7 @@ from pipeline.compare.nulls import Clues, Seen, score
 from pipeline.model import Array, Curve
 from pipeline.run.log import Log
 from pipeline.run.stages.budget import budgeted
+from pipeline.run.stages.contradicted import contradicted
 from pipeline.run.stages.entries import four_entries, replayed_entries
 from pipeline.run.stages.known import Context, Frame, Known
 from pipeline.run.stages.own_curves import rough
@@ -49,10 +50,11 @@ def _simulated_otherwise(
     ways = rival_ways(run, known)
 
     def one(number: int, _earlier: object) -> Any:
-        return rival_wires(run, known, *ways[number - 1]) if number else replayed_entries(run, known)
+        return rival_wires(run, known, ways[number - 1]) if number else replayed_entries(run, known)
 
     entered, *wires = run.share("compare", one, 1 + len(ways), clues.known_ways)
-    return entered, simulated_rivals(run, known, wires)
+    run.log.warnings += contradicted(run, known, ways, wires)
+    return entered, simulated_rivals(run, known, ways, wires)
 
 
 Row = dict[str, Any]

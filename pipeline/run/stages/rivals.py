@@ -6,6 +6,7 @@ arc length, of twelve wires 30 degrees apart: of all guesses that with the least
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,50 +23,70 @@ Wires = list[Array | None]
 """The wire of each frame that was simulated; None where it did not come to rest."""
 
 
-def _simulated(known: Known) -> list[Frame]:
+def simulated_frames(known: Known) -> list[Frame]:
+    """The frames with a simulated wire of more than a point."""
     return [f for f in known.frames if f.simulated is not None and len(f.simulated.joints_mm) > 1]
 
 
-def rival_ways(run: Context, known: Known) -> list[tuple[SimulateConfig, float]]:
-    """Settings and extra roll (degrees) of each simulation: one without the tip's curve, then ROLLS turned ones.
+class Way(NamedTuple):
+    """What a wire is simulated with that is not as stated; every roll is turned by ``turn_deg``."""
 
-    Empty where they are switched off, nothing was simulated, or the wire is straight at rest: without a curve to leave
-    out or to turn, both are the simulated wire again, which no simulator beats.
+    without: str
+    config: SimulateConfig
+    turn_deg: float = 0.0
+
+    @property
+    def catheter(self) -> bool:
+        """Whether a stated catheter lies over the wire."""
+        return self.without != CATHETER
+
+
+TIP_CURVE, ROLL, CATHETER = "no_tip_curve", "roll_unknown", "no_catheter"
+
+
+def rival_ways(run: Context, known: Known) -> list[Way]:
+    """How the rivals are simulated: without the tip's curve, ROLLS turned ones, without the catheter.
+
+    Empty where they are switched off or nothing was simulated. A wire that is straight at rest has no curve to leave
+    out or to turn: both would be the simulated wire again, which no simulator beats.
     """
-    if not run.config.compare.simulated_nulls or not run.case.wire.curved:
+    if not run.config.compare.simulated_nulls or not simulated_frames(known) or not np.isfinite(known.segment_mm):
         return []
-    if not _simulated(known) or not np.isfinite(known.segment_mm):
-        return []
-    plain = run.config.simulate
-    return [(replace(plain, rest_curvature_scale=0.0), 0.0), *((plain, 360.0 * i / ROLLS) for i in range(ROLLS))]
+    plain, ways = run.config.simulate, []
+    if run.case.wire.curved:
+        ways = [Way(TIP_CURVE, replace(plain, rest_curvature_scale=0.0))]
+        ways += [Way(ROLL, plain, 360.0 * i / ROLLS) for i in range(ROLLS)]
+    return ways + [Way(CATHETER, plain)] * any(frame.catheter_mm > 0.0 for frame in simulated_frames(known))
 
 
-def simulated_rivals(run: Context, known: Known, wires: Sequence[Wires]) -> dict[int, dict[str, Array]]:
-    """By frame and by name, the wires (n, 3) of both predictors; a frame that was not simulated has none.
+def simulated_rivals(
+    run: Context, known: Known, ways: Sequence[Way], wires: Sequence[Wires]
+) -> dict[int, dict[str, Array]]:
+    """By frame and by name, the wires (n, 3) of the predictors; a frame that was not simulated has none.
 
-    wires : of each of ``rival_ways``.
+    wires : of each of ``ways``.
     """
-    if not wires:
-        return {}
-    straight, *turned = wires
+    straight = [wire for way, wire in zip(ways, wires, strict=True) if way.without == TIP_CURVE]
+    turned = [wire for way, wire in zip(ways, wires, strict=True) if way.without == ROLL]
     found: dict[int, dict[str, Array]] = {}
-    for i, frame in enumerate(_simulated(known)):
+    for i, frame in enumerate(simulated_frames(known)):
         arc = samples(frame.depth_mm, run.config.compare.sample_mm)
         known_rolls = [at_arc(wire, arc) for one in turned if (wire := one[i]) is not None]
         mean = np.mean(known_rolls, axis=0) if len(known_rolls) > ROLLS // 2 else None
-        both = {"roll_unknown": mean, "no_tip_curve": straight[i]}
+        both = {ROLL: mean, TIP_CURVE: straight[0][i] if straight else None}
         found[frame.index] = {name: np.asarray(wire) for name, wire in both.items() if wire is not None}
     return found
 
 
-def rival_wires(run: Context, known: Known, config: SimulateConfig, turn_deg: float) -> Wires:
-    """The wires under one of ``rival_ways``: other settings, every roll turned by ``turn_deg``."""
-    case, lumen, clamp, frames = run.case, known.lumen, known.clamp, _simulated(known)
+def rival_wires(run: Context, known: Known, way: Way) -> Wires:
+    """The wires under one of ``rival_ways``."""
+    case, lumen, clamp, frames = run.case, known.lumen, known.clamp, simulated_frames(known)
     assert lumen is not None
     assert clamp is not None
     settings = replace(run.config.solver, segment_mm=known.segment_mm, finest_mm=run.config.solver.step_mm)
-    insertion = insertion_of(case.wire, case.wall, lumen, clamp, settings, config, case.catheter)
-    tips = [min(f.catheter_mm, f.depth_mm) for f in frames] if case.catheter else None
-    rolls = [frame.roll_deg + turn_deg for frame in frames]
+    catheter = case.catheter if way.catheter else None
+    insertion = insertion_of(case.wire, case.wall, lumen, clamp, settings, way.config, catheter)
+    tips = [min(f.catheter_mm, f.depth_mm) for f in frames] if catheter else None
+    rolls = [frame.roll_deg + way.turn_deg for frame in frames]
     wires = simulate(insertion, [frame.depth_mm for frame in frames], rolls, tips)
     return [np.asarray(wire.joints_mm) if wire.converged else None for wire in wires]

@@ -23,8 +23,8 @@ def compare_in_views(run: Context, known: Known) -> tuple[Frame, ...]:
     """The frames with their errors on the planes of their views, beside those of predictors that are shifted alike."""
     clues, config = _clues(run, known), run.config.compare
     ways = [] if clues is None else rival_ways(run, known)
-    wires = run.share("compare", lambda i, _: rival_wires(run, known, *ways[i]), len(ways))
-    simulated = simulated_rivals(run, known, wires)
+    wires = run.share("compare", lambda i, _: rival_wires(run, known, ways[i]), len(ways))
+    simulated = simulated_rivals(run, known, ways, wires)
     seen = [Seen(simulated=simulated.get(frame.index, {})) for frame in known.frames]
     frames = [_compared(frame, clues, told, config) for frame, told in zip(known.frames, seen, strict=True)]
     limited = "" if clues is None else _limited(frames, clues, config)
