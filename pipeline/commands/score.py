@@ -58,7 +58,9 @@ def main(args: argparse.Namespace) -> int:
         raise InputError(problems)
     (args.out / "simulators").mkdir(parents=True, exist_ok=True)
     done = {}
-    for name, plan in plans.items():
+    for number, (name, plan) in enumerate(plans.items(), start=1):
+        if not args.quiet:
+            say(f"simulator {number} of {len(plans)}: {name}")
         totals, page = launch(plan)
         # of wires that were handed in there is no time of a simulation
         done[name] = (totals if name == OURS else replace(totals, solver_s=0.0)), page

@@ -61,6 +61,9 @@ def write_comparison(out: Path, folders: Mapping[str, Path]) -> list[str]:
                 sentences.append("; ".join([said, *caveat]))
     tables.write(out / SIMULATORS.file, SIMULATORS, rows)
     tables.write(out / WHERE.file, WHERE, [] if mixed else list(_where(folders, studies, common, off)))
+    none = [row["simulator"] for row in rows if row.get("frames_ok") == 0]
+    if none and common and not mixed:
+        sentences.append(f"who is nearest where is left out: no frame counts for {listed(none)}")
     return sentences
 
 

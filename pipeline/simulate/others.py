@@ -55,7 +55,9 @@ def oddity(points_mm: Array, entry_mm: Array, direction: Array, unit: str = "mm"
     if not wrong:
         return ""
     readings = _readings(points_mm, unit)
-    found = next((name for name, other in readings if not _misplaced(other, entry_mm, direction)), "")
+    # one that only just passes, too, explains nothing
+    near = 0.5 * AT_ENTRY_MM
+    found = next((name for name, other in readings if not _misplaced(other, entry_mm, direction, near)), "")
     return wrong + (f": it would if it were {found}" if found else "; check its coordinates")
 
 
@@ -69,12 +71,12 @@ def _turned_back(points_mm: Array) -> int:
     return int(long[found[0]]) + 1 if len(found) else 0
 
 
-def _misplaced(points_mm: Array, entry_mm: Array, direction: Array) -> str:
+def _misplaced(points_mm: Array, entry_mm: Array, direction: Array, near_mm: float = AT_ENTRY_MM) -> str:
     # what is added to reach the plane points along the entry by construction: it tells nothing
     wire = points_mm if (points_mm[0] - entry_mm) @ direction > 0 else begun(points_mm, entry_mm, direction)
     gap = float(np.linalg.norm(wire[0] - entry_mm))
-    if gap > AT_ENTRY_MM:
-        return f"its base passes {gap:.3g} mm from entry_mm and not within {AT_ENTRY_MM:g}"
+    if gap > near_mm:
+        return f"its base passes {gap:.3g} mm from entry_mm and not within {near_mm:g}"
     first = at_arc(wire, np.array([min(OVER_MM, float(arc_length(wire)[-1]))]))[0] - wire[0]
     turn = angle_deg(first, direction)
     if turn > LARGEST_TURN_DEG:

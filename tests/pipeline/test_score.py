@@ -206,6 +206,13 @@ def test_a_unit_that_a_file_states_wrongly_is_told_as_it_is(tmp_path: Path) -> N
     assert not_to_depth(40e3, 40.0, 2.0, found.unit).endswith("is it in mm?")
 
 
+def test_a_reading_that_only_just_passes_is_none() -> None:
+    """5.2 mm beside an entry 0.3 mm beside the origin: the other side of it lies 4.6 mm off, and RAS was it."""
+    entry, up = np.array([0.3, 0.0, 50.0]), np.array([0.0, 0.0, 1.0])
+    wire = entry - [5.2, 0.0, 0.0] + np.arange(20.0)[:, None] * up
+    assert oddity(wire, entry, up).endswith("check its coordinates")
+
+
 def test_wires_in_another_order_are_told() -> None:
     """Neighbours that were swapped passed where frames lie nearer together than the tolerance of depths."""
     depths = np.array([10.0, 11.5, 13.0, 14.5])

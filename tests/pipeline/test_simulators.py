@@ -286,7 +286,8 @@ def test_a_simulator_without_any_usable_wire_is_shown(tmp_path: Path) -> None:
         result = json.loads((folder / "result.json").read_text(encoding="utf-8"))
         result["summary"] |= {"frames_ok": 0, "frames_failed": 4}
         (folder / "result.json").write_text(json.dumps(result), encoding="utf-8")
-    assert write_comparison(tmp_path, {"none": none, "wireval": ours}) == []
+    told = write_comparison(tmp_path, {"none": none, "wireval": ours})
+    assert told == ["who is nearest where is left out: no frame counts for none"], "its figure was missing silently"
     table = pd.read_csv(tmp_path / "simulators.csv").set_index("simulator")
     assert (table.loc["none", "frames"], table.loc["none", "frames_ok"], table.loc["none", "within_1mm"]) == (
         24,
