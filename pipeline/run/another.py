@@ -24,7 +24,8 @@ from reports.frames_file import read_arrays
 SAME_ENTRY_MM = 2.0
 """Traces that begin farther apart count their depths from different places and are not compared."""
 NEAREST_MM = 2.0
-"""How far off the nearest depth may be, at the least; else as far as one frame is from the next."""
+"""How far off the nearest depth may be, at the least; else half as far as one of its frames is from the next: a trace
+that is farther off stands in for one that is missing, and what is lost would make the wire look better."""
 STEP_MM = 0.5
 MOST_OTHERS = 24
 """Most traces in a guess, those of the nearest depths: with all of 500 cases in one phantom it would take ten minutes,
@@ -84,17 +85,23 @@ def _with_another(case: Found, shared: Sequence[Found], traces: Mapping[str, Tra
     return replace(case, frames=frames)
 
 
+def _reach_mm(traces: Traces, otherwise: float) -> float:
+    """How far off in depth a trace of a case may be to be a guess. otherwise : where the case has one alone."""
+    steps = np.abs(np.diff(sorted(depth for depth, _ in traces.values())))
+    return max(NEAREST_MM, 0.5 * float(np.median(steps))) if len(steps) else otherwise
+
+
 class Others:
     """The traces of other cases in one flat list, each with the number of its case and its insertion.
 
-    own : the case's, for how far a frame is from the next.
+    own : the case's, for how far a frame is from the next where another has one alone.
     """
 
     def __init__(self, cases: Sequence[tuple[str, Traces]], own: Traces) -> None:
         self.traces = [(n, name, *trace) for n, (name, traces) in enumerate(cases) for trace in traces.values()]
         self.depths_mm = np.array([depth for _, _, depth, _ in self.traces])
-        steps = np.abs(np.diff([depth for depth, _ in own.values()]))
-        self.reach_mm = max(NEAREST_MM, float(np.median(steps)) if len(steps) else 0.0)
+        usual = _reach_mm(own, NEAREST_MM)
+        self.reach_mm = np.array([_reach_mm(traces, usual) for _, traces in cases for _ in traces])
 
     def nearest(self, depth_mm: float, curve: Array) -> list[tuple[str, Array]]:
         """The trace of nearest depth of each other case, with its insertion, unless it begins elsewhere.
@@ -104,9 +111,10 @@ class Others:
         near: list[tuple[str, Array]] = []
         seen: set[int] = set()
         off_mm = np.abs(self.depths_mm - depth_mm)
-        for place in np.argsort(off_mm, kind="stable"):
+        order = np.argsort(off_mm, kind="stable")
+        for place in order[off_mm[order] <= self.reach_mm[order]]:
             owner, insertion, _, wire = self.traces[place]
-            if len(near) == MOST_OTHERS or off_mm[place] > self.reach_mm:
+            if len(near) == MOST_OTHERS:
                 break
             if owner not in seen and math.dist(wire[0], curve[0]) < SAME_ENTRY_MM:
                 near.append((insertion, wire))

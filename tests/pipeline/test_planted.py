@@ -240,6 +240,18 @@ def test_a_trace_of_another_depth_is_no_guess(out: Path) -> None:
     assert not [f for case in with_another(out, apart) for f in case.frames.values() if f.guesses]
 
 
+def test_a_lost_trace_makes_no_guess_worse(out: Path) -> None:
+    """Where one was lost the insertion's next took its place, 7 mm off: the guess got weaker, the verdict better."""
+    found = found_cases(out)
+    lost = [replace(c, traced_mm={n: d for n, d in c.traced_mm.items() if n != 2}) for c in found]
+    before, after = (with_another(out, cases)[0].frames for cases in (found, [found[0], lost[1], found[2]]))
+    kept = found[2].insertion
+    assert {n: len(frame.guesses) for n, frame in before.items()} == dict.fromkeys(before, 2)
+    assert set(after[2].guesses) == {kept}
+    assert after[2].guesses[kept] == before[2].guesses[kept]
+    assert not with_another(out, [found[0], *lost[1:]])[0].frames[2].guesses
+
+
 def test_what_the_wire_ends_with_is_pooled_over_its_points(out: Path) -> None:
     """Of a frame it weighed as much as all of its points, of which a short wire has as many as there are."""
     ends = []
