@@ -9,11 +9,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pipeline.calibrate.agreement import no_common_roll
 from pipeline.calibrate.fit import Linear, Problem
 from pipeline.calibrate.residuals import Evidence
 from pipeline.calibrate.search import Fit, fitted, held_at_prior
 from pipeline.calibrate.trials import replayed
-from pipeline.calibrate.unknowns import Unknown, spread_in_words
+from pipeline.calibrate.unknowns import ROLL, Unknown, spread_in_words
 from pipeline.model import Array
 from pipeline.simulate.config import SolverConfig
 
@@ -74,7 +75,8 @@ def calibrated(free: Sequence[Unknown], evidence: Sequence[Evidence], solver: So
     """Fit everything; what is not seen stays at its prior and the rest is fitted again."""
     whole = fitted(free, evidence, solver)
     profiles = profiles_of(whole)
-    found = [_judged(u, whole, p) for u, p in zip(whole.problem.free, profiles, strict=True)]
+    apart = {ROLL: no_common_roll(whole)}
+    found = [_judged(u, whole, p, apart.get(u.name, "")) for u, p in zip(whole.problem.free, profiles, strict=True)]
     unseen = [e.unknown.name for e in found if not e.seen]
     last = held_at_prior(whole, unseen) if unseen else whole
     estimates = tuple(replace(e, used=last.values[e.unknown.name]) for e in found)
@@ -85,20 +87,25 @@ def calibrated(free: Sequence[Unknown], evidence: Sequence[Evidence], solver: So
     return Calibration(estimates, correlation, tuple(_errors(last)), last, last.linear.scale)
 
 
-def _judged(unknown: Unknown, fit: Fit, profile: tuple[tuple[float, float], ...]) -> Estimate:
-    """The estimate of a parameter, which says whether it is seen and, if not, why."""
+def _judged(unknown: Unknown, fit: Fit, profile: tuple[tuple[float, float], ...], apart: str) -> Estimate:
+    """The estimate of a parameter, which says whether it is seen and, if not, why. apart : that no value is common."""
     value, sd = fit.values[unknown.name], fit.sd[unknown.name]
+    why = apart or _unseen(unknown, value, sd, profile)
+    return Estimate(unknown, value, sd, value, not why, why, profile)
+
+
+def _unseen(unknown: Unknown, value: float, sd: float, profile: tuple[tuple[float, float], ...]) -> str:
+    """Why the traces do not show a parameter; empty where they do."""
     near = [(v, rise) for v, rise in profile if abs(abs(v - value) - unknown.enough) < 1e-6 * unknown.enough]
     flat = [v for v, rise in near if not rise >= RISE]
-    why = ""
     if sd > unknown.enough:
         known, enough = (spread_in_words(s, logarithmic=unknown.logarithmic) for s in (sd, unknown.enough))
-        why = f"known to {known} only; {enough} or less counts as seen"
-    elif flat:
-        why = f"the objective hardly rises towards {', '.join(f'{unknown.shown(v):.3g}' for v in flat)}"
-    elif np.isclose(value, unknown.high) or (np.isclose(value, unknown.low) and unknown.logarithmic):
-        why = f"it runs to the end of its range, {unknown.shown(value):.3g}"
-    return Estimate(unknown, value, sd, value, not why, why, profile)
+        return f"known to {known} only; {enough} or less counts as seen"
+    if flat:
+        return f"the objective hardly rises towards {', '.join(f'{unknown.shown(v):.3g}' for v in flat)}"
+    if np.isclose(value, unknown.high) or (np.isclose(value, unknown.low) and unknown.logarithmic):
+        return f"it runs to the end of its range, {unknown.shown(value):.3g}"
+    return ""
 
 
 def profiles_of(fit: Fit) -> list[tuple[tuple[float, float], ...]]:

@@ -84,6 +84,22 @@ def test_parameters_are_found_again_and_the_clamp_with_them():
     assert all(frame.after_mm < frame.before_mm for frame in fit.frames)
 
 
+@pytest.mark.parametrize(("stated_deg", "apart"), [(0.0, False), (-12.0, True)])
+def test_rolls_that_are_stated_wrongly_have_no_common_offset(stated_deg, apart):
+    """Of two insertions, one stated 11 degrees off, the mean was taken: 5 degrees wrong for both, +- 0.7, seen."""
+    first, second = (
+        replace(trial(noise=0.01), name="a"),
+        replace(trial(noise=0.01, depths=(12.0, 18.0, 22.0)), name="b"),
+    )
+    seen = tuple(replace(frame, roll_deg=frame.roll_deg + stated_deg) for frame in second.seen)
+    both = first, replace(second, seen=seen)
+    found = calibrated(all_of(*both), [Evidence(one) for one in both], SETTINGS)
+    roll = next(e for e in found.estimates if e.unknown.name == ROLL)
+    assert roll.seen is not apart
+    assert ("b wants 12 degrees more than a" in roll.why) is apart
+    assert roll.used == (0.0 if apart else pytest.approx(17.0, abs=1.0))
+
+
 def test_a_straight_uniform_wire_shows_no_roll_and_no_taper():
     plain = replace(WIRE, bending_stiffness_N_mm2=1.0, rest_curvature_per_mm=0.0)
     one = trial(plain, {FRICTION: 0.0})

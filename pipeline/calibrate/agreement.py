@@ -1,0 +1,51 @@
+"""Do the insertions agree on a roll? One offset for all is no answer to rolls that are stated wrongly for each."""
+
+import numpy as np
+from scipy.special import chdtrc
+
+from pipeline.calibrate.search import Fit
+from pipeline.calibrate.unknowns import ROLL
+
+CHANCE = 1e-3
+"""Probability below which insertions that want one roll are not so far apart."""
+LEAST_DEG = 3.0
+"""Rolls that are nearer together are no fault of the manifest: nobody sets a torque device better."""
+
+
+def own_rolls(fit: Fit) -> dict[str, tuple[float, float]]:
+    """By insertion, how far its traces alone would turn the common roll, degrees, and its standard deviation.
+
+    Its clamp and depths follow; the other shared parameters stay. Insertions of a roll of their own are not asked.
+    """
+    problem, linear, k = fit.problem, fit.linear, [u.name for u in fit.problem.free].index(ROLL)
+    means, sigmas = problem.prior
+    (residuals,) = problem.residuals([linear.x], linear.weights, linear.scale)
+    found = {}
+    for one, part, jacobian, rest in zip(problem.evidence, problem.parts(), linear.jacobian, residuals, strict=True):
+        own = [i for i in range(part.start, part.stop) if sigmas[i] > 0.0]
+        columns = jacobian[:, [k, *own]]
+        precision = np.concatenate([[0.0], sigmas[own] ** -2.0])
+        normal = columns.T @ columns + np.diag(precision)
+        if one.trial.roll_free or not normal[0, 0] > 0.0:
+            continue
+        wanted = np.linalg.solve(
+            normal, columns.T @ rest + precision * np.concatenate([[0.0], (means - linear.x)[own]])
+        )
+        found[one.trial.name] = float(wanted[0]), float(np.sqrt(np.linalg.inv(normal)[0, 0]))
+    return found
+
+
+def no_common_roll(fit: Fit) -> str:
+    """Why there is no roll that all insertions agree on; empty where there is."""
+    if ROLL not in [u.name for u in fit.problem.free]:
+        return ""
+    found = own_rolls(fit)
+    shifts, sds = np.array([*found.values()]).reshape(-1, 2).T
+    if len(found) < 2 or np.ptp(shifts) < LEAST_DEG:
+        return ""
+    middle = float(np.average(shifts, weights=sds**-2.0))
+    if chdtrc(len(found) - 1, float(np.sum(((shifts - middle) / sds) ** 2))) > CHANCE:
+        return ""
+    low, high = (list(found)[int(place)] for place in (np.argmin(shifts), np.argmax(shifts)))
+    apart = f"{high} wants {np.ptp(shifts):.0f} degrees more than {low}"
+    return f"the insertions want no common one: {apart}; check roll_deg of each (degrees) and material_axis"
