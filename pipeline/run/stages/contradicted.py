@@ -4,12 +4,13 @@ What wins is not put in its place: what is chosen by some frames is not judged b
 """
 
 from collections.abc import Sequence
+from itertools import compress
 
 import numpy as np
 
 from pipeline.arrays.polyline import at_arc, samples
 from pipeline.compare.config import CompareConfig
-from pipeline.compare.metrics import point_to_curve, rms, scored
+from pipeline.compare.metrics import point_to_curve, scored
 from pipeline.model import Array
 from pipeline.run.stages.known import Context, Frame, Known
 from pipeline.run.stages.rivals import CATHETER, ROLL, TIP_CURVE, Way, Wires, simulated_frames
@@ -17,38 +18,66 @@ from pipeline.run.stages.rivals import CATHETER, ROLL, TIP_CURVE, Way, Wires, si
 FAR_NEARER = 0.7
 """Share of its rms distance below which a wire that is simulated otherwise speaks against what is stated: half the mean
 square. Of a wire turned by 60 degrees or more, the right roll is that."""
+FRAME_NEARER, LEAST_MM = 0.4, 0.3
+"""The same for a frame alone, whose wire may have let go, and the least rms distance that is worth a word there."""
 
 
 def contradicted(run: Context, known: Known, ways: Sequence[Way], wires: Sequence[Wires]) -> list[str]:
-    """A warning where one of ``ways`` lies far nearer than the wire as stated; of several, the nearest.
+    """A warning where one of ``ways`` lies far nearer than the wire as stated, in the case or in a frame of it.
 
-    wires : of each of ``ways``. Own simulators' wires say nothing about what this one is told.
+    Of several ways, the nearest. wires : of each of ``ways``. Own simulators' wires say nothing about what this one is
+    told.
     """
-    frames, config = simulated_frames(known), run.config.compare
     if run.case.simulated is not None:
         return []
-    nearer: list[tuple[float, float, Way]] = []
-    for way, others in zip(ways, wires, strict=True):
-        pairs = [(f, wire) for f, wire in zip(frames, others, strict=True) if wire is not None and _counts(f)]
-        if 2 * len(pairs) > len(frames):
-            other = rms(np.concatenate([_distances(frame, wire, config) for frame, wire in pairs]))
-            stated = rms(np.concatenate([_distances(f, f.solved.joints_mm, config) for f, _ in pairs if f.solved]))
-            nearer += [(other, stated, way)] if other < FAR_NEARER * stated else []
-    return [_said(*min(nearer, key=lambda one: one[0]))] if nearer else []
+    frames, config = simulated_frames(known), run.config.compare
+    stated = [_squares(f, None if f.solved is None else f.solved.joints_mm, config) for f in frames]
+    otherwise = [[_squares(f, wire, config) for f, wire in zip(frames, own, strict=True)] for own in wires]
+    whole = _nearest(ways, stated, otherwise, FAR_NEARER)
+    if whole:
+        return [_said("", *whole)]
+    turned = [way.without == ROLL for way in ways]
+    rolls, by_roll = list(compress(ways, turned)), list(compress(otherwise, turned))
+    alone = [_nearest(rolls, [own], [of[i : i + 1] for of in by_roll], FRAME_NEARER) for i, own in enumerate(stated)]
+    return [
+        _said(f"frame {frame.index}: ", *one)
+        for frame, one in zip(frames, alone, strict=True)
+        if one and one[1] > LEAST_MM and not frame.uncertain
+    ]
 
 
-def _counts(frame: Frame) -> bool:
-    return frame.ok and frame.trusted_curve is not None and frame.solved is not None
+Squares = tuple[float, int]
+"""Sum of squared distances in mm^2, and of how many points; of none where a wire or a trace is missing."""
 
 
-def _distances(frame: Frame, wire: Array, config: CompareConfig) -> Array:
-    """Of a wire's scored points from the frame's trace, mm."""
-    assert frame.curve is not None
+def _squares(frame: Frame, wire: Array | None, config: CompareConfig) -> Squares:
+    """Of a wire's scored points from the frame's trace."""
+    curve = frame.trusted_curve
+    if wire is None or curve is None or not frame.ok:
+        return 0.0, 0
     arc = scored(samples(frame.depth_mm, config.sample_mm), config.skip_mm)
-    return point_to_curve(at_arc(wire, arc), frame.curve.points_mm)[0]
+    off = point_to_curve(at_arc(wire, arc), curve.points_mm)[0]
+    return float(off @ off), len(off)
 
 
-def _said(other_mm: float, stated_mm: float, way: Way) -> str:
+def _nearest(
+    ways: Sequence[Way], stated: Sequence[Squares], otherwise: Sequence[Sequence[Squares]], share: float
+) -> tuple[float, float, Way] | None:
+    """The way whose rms distance is least, with it and the stated one's over the same frames; None above a share.
+
+    otherwise : of each way, as ``stated`` by frame.
+    """
+    found = []
+    for way, own in zip(ways, otherwise, strict=True):
+        both = [(*a, b[0]) for a, b in zip(stated, own, strict=True) if a[1] and b[1]]
+        if 2 * len(both) > len(stated):
+            squares, count, others = np.sum(both, axis=0)
+            found.append((float(np.sqrt(others / count)), float(np.sqrt(squares / count)), way))
+    nearer = [one for one in found if one[0] < share * one[1]]
+    return min(nearer, key=lambda one: one[0]) if nearer else None
+
+
+def _said(where: str, other_mm: float, stated_mm: float, way: Way) -> str:
     """The warning, with what to look at."""
     how, do = {
         TIP_CURVE: ("straight at rest", "rest_curvature_per_mm, its sign and unit, and roll_deg"),
@@ -59,6 +88,6 @@ def _said(other_mm: float, stated_mm: float, way: Way) -> str:
         CATHETER: ("without the catheter", "whether the scans show one, its stiffness and its insertion_mm"),
     }[way.without]
     return (
-        f"{how}, the simulated wire lies {other_mm:.2f} mm (rms) from the traced ones, as stated {stated_mm:.2f} mm: "
-        f"check {do}; what is chosen by these frames is not judged by them"
+        f"{where}{how}, the simulated wire lies {other_mm:.2f} mm (rms) from the traced one, as stated "
+        f"{stated_mm:.2f} mm: check {do}; what is chosen by these frames is not judged by them"
     )
