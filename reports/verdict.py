@@ -61,7 +61,7 @@ def remarks(statistics: Mapping[str, Any], simulator: str = "") -> list[str]:
 def _unknown_roll(statistics: Mapping[str, Any], simulator: str) -> str:
     """That a roll which is stated does worse than none, where the wire is no better than a guess."""
     rms, unknown = (_number(statistics.get(key)) for key in ("rms_mm", "null_roll_unknown_rms_mm"))
-    if standing(statistics) not in (NO_BETTER, WORSE) or not unknown < FAR_BELOW * rms:
+    if not _skill(statistics)[1] <= 0.0 or not unknown < FAR_BELOW * rms:
         return ""
     mend = 'check axes (LPS or RAS) and roll; roll_deg = "fit" finds the roll of a wire that is simulated here'
     if simulator not in ("", OURS):
@@ -89,10 +89,12 @@ def standing(statistics: Mapping[str, Any]) -> str:
     """WORSE, NO_BETTER, TIPS_OFF or NOT_SHOWN; empty where the wire beats the strongest predictor, or no more is known.
 
     WORSE where the whole interval of the skill is below zero; without an interval where the skill is below WORSE_BELOW.
+    Where the interval is on both sides nothing is shown, whatever the skill.
     """
     _, skill, least, most = _skill(statistics)
     if skill <= 0.0:
-        return WORSE if most < 0.0 or (isnan(least) and isnan(most) and skill < WORSE_BELOW) else NO_BETTER
+        worse = most < 0.0 or (isnan(least) and isnan(most) and skill < WORSE_BELOW)
+        return WORSE if worse else NOT_SHOWN if most > 0.0 else NO_BETTER
     return TIPS_OFF if tips_off(statistics) else NOT_SHOWN if least <= 0.0 else ""
 
 

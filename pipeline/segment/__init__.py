@@ -12,6 +12,7 @@ from pipeline.model import Lumen, Volume
 from pipeline.segment import bone, uneven
 from pipeline.segment.config import SegmentConfig
 from pipeline.segment.contact import contacts, warning
+from pipeline.segment.cut_off import cut_off
 from pipeline.segment.fuzzy import fuzzy_region
 from pipeline.segment.levels import Region, brighter, scanner_blur
 from pipeline.segment.necks import add_necks, closed_necks
@@ -85,6 +86,7 @@ def segment(
     found = _found(grid, seeds_mm, config, wire_radius_mm is not None)
     if wire_radius_mm is not None:
         found = _around_wire(grid, found, seeds_mm, config, wire_radius_mm)
+    cut = cut_off(grid, found.distance, found.site.corner)
     grid, region, site, wall, blur = found.grid, found.region, found.site, found.wall, found.blur
     open_ones, bright = side_by_side(
         lambda: contacts(found.distance), lambda: bone.touching(grid, found.distance, site.corner, wall.levels)
@@ -93,7 +95,11 @@ def segment(
         thin = balls(grid, region.thin, site.corner, region.levels, blur)
         add_balls(wall.values, np.asarray(grid.spacing_mm), thin, config.outer_mm)
     other = brighter(wall.levels) + bright + uneven.warning(found.least)
-    said = warning(open_ones) + (other or bone.two_greys(grid, found.distance, site.corner, wall.levels, wall.blur_mm))
+    said = (
+        cut
+        + warning(open_ones)
+        + (other or bone.two_greys(grid, found.distance, site.corner, wall.levels, wall.blur_mm))
+    )
     box = wall.values, site.corner
     said += add_necks(region.necks, box, grid, region.levels, blur)
     said += add_necks(closed_necks(*box, grid, config.least_voxels), box, grid, region.levels, blur)

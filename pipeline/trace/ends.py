@@ -10,9 +10,10 @@ from pipeline.trace.ahead import dark_ahead, hidden_ahead
 from pipeline.trace.attempt import Attempt
 from pipeline.trace.onward import seen_outside
 from pipeline.trace.reach import end_range
-from pipeline.trace.section import WIDE_END, fills_vessel, wide_end
+from pipeline.trace.section import fills_vessel
 from pipeline.trace.subtraction import Subtraction
 from pipeline.trace.tube import Tube
+from pipeline.trace.width import WIDE, wide_end
 
 EDGE_VOXELS, OUTSIDE_VOXELS = 2.0, -1.0
 """Distance from the scan's end within which a curve's end is no tip: traces of wires that leave the scan end 1.0 inside
@@ -119,7 +120,7 @@ def of_the_ends(image: Subtraction, attempt: Attempt, points: Array, length_mm: 
     step = length_mm / max(1, len(points) - 1)
     folded = beside_itself(points, step, TIP_BESIDE * image.voxel)
     known = attempt.tube.steps.stated or image.thick_slices
-    wide = 0.0 if known or folded[-1] else wide_end(image, points, attempt.tube.sigma)
+    wide = 0.0 if known or folded[-1] else wide_end(image, attempt.tube, points)
     return (
         (missing_mm > 0.0, FrameStatus.TRACE_AMBIGUOUS,
          f"a line that ends {missing_mm:.1f} mm before the tip, by the wire's opacity", "one that goes to the tip",
@@ -134,7 +135,7 @@ def of_the_ends(image: Subtraction, attempt: Attempt, points: Array, length_mm: 
          "a dark line ahead of the curve's end", "a tip with nothing beyond it",
          "look whether the wire goes on, less dense than the contrast medium: its end is not seen then"),
         (wide > 0.0, FrameStatus.TRACE_AMBIGUOUS,
-         f"an end {wide:.2f} times as wide as the line before it", f"{WIDE_END:g} times at most",
+         f"an end {wide:.2f} times as wide as the line before it", f"{WIDE[0]:g} times at most",
          "look whether something else is at the tip (a bead, an air bubble of the reference, contrast medium that it "
          "lacks); state the wire's opacity if its own end is so thick"),
         (max(back_mm, on_mm) > sure_mm, FrameStatus.TRACE_AMBIGUOUS,

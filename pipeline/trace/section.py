@@ -42,7 +42,7 @@ def out_of_round(image: Subtraction, points: Array, sigma: float) -> tuple[Array
     wire has its usual height.
     """
     step = float(np.mean(np.linalg.norm(np.diff(points, axis=0), axis=1)))
-    phi, grey = _rings(image, points, RING_BLURS * sigma)
+    phi, grey = rings(image, points, RING_BLURS * sigma)
     harmonic = 2.0 / ANGLES * np.exp(2j * phi) @ grey
     width = min(len(points), max(1, round(OVER_MM / step)))
     window = np.ones(width) / width
@@ -54,34 +54,7 @@ def out_of_round(image: Subtraction, points: Array, sigma: float) -> tuple[Array
     return np.asarray(smooth, float), float(noise)
 
 
-END_VOXELS, LEAST_BODY_VOXELS = 5.0, 4.0
-"""Length of the end whose width is looked at, and the least length of the line before it."""
-WIDE_END, WIDE_IN_MODEL, SURELY_WIDE = 1.2, 1.3, 4.0
-"""How much wider than the line before it an end is that is no wire's, with a background that was measured and with a
-modelled one, and by how many standard deviations: J tips of 1 to 2 voxels radius have up to 1.13, plain wires
-1.05 (1.15 in a modelled one); a bead or a bubble beside the tip has 1.25, a jet of contrast medium 1.3 to 1.5."""
-
-
-def wide_end(image: Subtraction, points: Array, sigma: float) -> float:
-    """How much wider a curve's (n, 3) end is than what lies before it; 0 where that is not sure, or not too much.
-
-    Grey on a ring of radius R over that on the axis is exp(-R^2 / 2 s^2), which tells s where the line ends, too.
-    """
-    step = float(np.mean(np.linalg.norm(np.diff(points, axis=0), axis=1)))
-    ring = np.mean(_rings(image, points, RING_BLURS * sigma)[1], axis=0)
-    axis, end = image.along(points), np.arange(len(points))[::-1] * step < END_VOXELS * image.voxel
-    if np.count_nonzero(~end) * step < LEAST_BODY_VOXELS * image.voxel:
-        return 0.0
-    body, own = (float(np.sum(ring[part]) / max(np.sum(axis[part]), 1e-9)) for part in (~end, end))
-    # a ring's mean has half of the noise of its axis, which is independent every INDEPENDENT_VOXELS
-    noise = 0.5 * image.noise_in(CREST_VOXELS) / np.sqrt(END_VOXELS / INDEPENDENT_VOXELS) / float(np.mean(axis[end]))
-    if not 0.0 < body < own or not own - body > SURELY_WIDE * noise > 0.0:
-        return 0.0
-    wider = float(np.sqrt(np.log(body) / np.log(min(own, 0.99))))
-    return wider if wider > (WIDE_IN_MODEL if image.modelled else WIDE_END) else 0.0
-
-
-def _rings(image: Subtraction, points: Array, radius: float) -> tuple[Array, Array]:
+def rings(image: Subtraction, points: Array, radius: float) -> tuple[Array, Array]:
     """Angles (a,), and the grey (a, n) on a ring about each point of a curve (n, 3)."""
     t = np.gradient(points, axis=0)
     t /= np.linalg.norm(t, axis=1)[:, None]

@@ -122,6 +122,9 @@ def test_what_can_be_seen_is_traced(case, seed):
             ("a catheter that reaches beyond the wire", 2, "TRACE_AMBIGUOUS"),  # 13 mm of it taken for wire, and ok
             ("a catheter that reaches beyond the wire", 3, "TRACE_AMBIGUOUS"),  # the same, with a marker at its end
             ("a marker at the tip, beyond 5 to 15 mm unseen", 5, "TRACE_AMBIGUOUS"),  # cut by 16 mm, and ok
+            ("a bead or a jet of contrast ahead of the tip", 5, "TRACE_AMBIGUOUS"),  # the bead taken for wire, and ok
+            ("a bead or a jet of contrast ahead of the tip", 3, "TRACE_AMBIGUOUS"),  # the same, without a reference
+            ("a bead or a jet of contrast ahead of the tip", 12, "TRACE_AMBIGUOUS"),  # 6 voxels of the jet, and ok
             ("no wire, no reference", 421, "TRACE_LOW_CONTRAST"),  # 2 mm of noise, narrower than the scanner can see
             ("no wire, no reference", 1210, "TRACE_LOW_CONTRAST"),  # 2 mm of noise, as wide as a wire, and ok
         ]

@@ -75,9 +75,11 @@ def test_a_status_is_worse_only_where_that_is_known(was: str, now: str, verdict:
 
 
 def test_a_recovered_frame_is_no_regression() -> None:
-    before = _table([{"frame": 0, "status": "no_wire"}])
-    found = diff.diff_tables({"c": before}, {"c": _table([_row()])}, TOLERANCE)
-    assert found.regressions.empty
+    """Nor has it moved: the depth that was stated gave way to the traced one, and a gate closed."""
+    before = _table([{"frame": 0, "status": "no_wire", "insertion_mm": 30.0}])
+    found = diff.diff_tables({"c": before}, {"c": _table([_row(insertion_mm=31.0)])}, TOLERANCE)
+    assert found.closing.empty
+    assert found.sentence.endswith("no regression; 1 frame that failed is ok now: c frame 0")
     assert found.rows.set_index("column").loc["status", "verdict"] == "better"
 
 

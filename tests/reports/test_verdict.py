@@ -132,7 +132,7 @@ def test_wires_that_fold_back_in_a_third_of_the_frames_are_not_called_better() -
     ],
 )
 def test_worse_is_said_where_the_whole_interval_is(low: float | None, high: float | None, text: str) -> None:
-    """A skill of -38.6 was called "no better"."""
+    """A skill of -38.6 was called "no better", and one of -0.13, anywhere from -36 to 0.97, too."""
     row = {"rms_mm": 0.25, "skill_strongest": -0.04, "skill_strongest_low": low, "skill_strongest_high": high}
     row |= {"strongest_null": "previous"}
     assert badge("ok", True, row) == {"text": f"{text} than a guess", "look": "poor"}

@@ -508,3 +508,18 @@ def settled(rng, seed):
     d.more = [(share * r.vessel(d.lattice, d.axis, d.radius), r.CONTRAST)]
     d.level *= 0  # all of it is drawn by ``more``
     return d.scan((8, 16)[seed // 2 % 2], reference=seed % 2 == 0)
+
+
+@case("a bead or a jet of contrast ahead of the tip")
+def wider_ahead(rng, seed):
+    """Wider than the wire, in the frame alone: a bead 0.5 mm beside its line, or medium that fades over 3 mm."""
+    d = Draft(rng, radius=2.5, room=1.0)
+    t = d.path[-1] - d.path[-20]
+    t /= np.linalg.norm(t)
+    if seed % 2:
+        line = sideways(d.path[-1] + np.linspace(0.5, 1.3, 16)[:, None] * t, rng, 0.5)
+        d.others = [(line, 0.5, rng.uniform(0.3, 0.8))]
+    else:
+        along = np.linspace(0.0, 3.0, 61)
+        d.others = [(d.path[-1] + along[:, None] * t, rng.uniform(0.45, 0.6), rng.uniform(0.1, 0.25) * (1 - along / 3))]
+    return d.scan((8, 16)[seed // 2 % 2], reference=seed % 4 < 2)
