@@ -124,6 +124,10 @@ def results_in(out_dir: Path) -> dict[str, dict[str, Any]]:
     return found
 
 
+MADE_FROM_TRACES = "only wires that were made from the traces"
+"""What a warning of wires that lie nearer to the traces than these are known says; their errors are none."""
+
+
 def said_by_cases(results: Mapping[str, Mapping[str, Any]], key: str) -> list[str]:
     """What the cases of a run say under ``warnings`` or ``assumptions``, each text once, with the cases that say it.
 

@@ -8,7 +8,7 @@ from urllib.parse import quote
 import pandas as pd
 
 from reports import _content
-from reports.case_files import counted, find_cases, listed, not_reached, not_run_sentence, warnings_of
+from reports.case_files import MADE_FROM_TRACES, counted, find_cases, listed, not_reached, not_run_sentence, warnings_of
 from reports.figures.simulators import SimulatorFiles, leads
 from reports.origin import mixed_settings
 from reports.page import draw_sections, write_page
@@ -66,7 +66,9 @@ def _said(alone: Mapping[Any, Any], folder: Path, ours: Mapping[str, list[str]])
     missing, mixed, good = not_run_sentence(folder), mixed_settings(folder), alone["frames_ok"]
     failed = f"On {good} of {alone['frames']} frames: " if good < alone["frames"] else ""
     status = "cases missing" if missing else "frames failed" if failed else "settings differ" if mixed else "ok"
-    said = verdict(row, alone["simulator"])
+    said, theirs = verdict(row, alone["simulator"]), next((line for line in lines if MADE_FROM_TRACES in line), "")
+    if theirs and status == "ok":
+        status, said = "made from the traces", f"{theirs}."
     said = failed + said if said else mixed or not_reached(folder) or "No frame of it has a result." * (not good)
     aside = f" Of the study {missing}." if missing else ""
     return {

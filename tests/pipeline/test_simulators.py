@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from pipeline.cli import main
 from pipeline.run.simulators import Piece, _rows, side_by_side, write_comparison
 from reports import tables
+from reports.case_files import MADE_FROM_TRACES
 from reports.schema import ERRORS, POINTS, SIMULATORS, SUMMARY, WHERE
 from reports.simulators import _where, in_common, render_simulators
 
@@ -297,3 +298,16 @@ def test_a_simulator_without_any_usable_wire_is_shown(tmp_path: Path) -> None:
     page = render_simulators(tmp_path).read_text(encoding="utf-8")
     assert page.count("No frame of it has a result.") == 1
     assert page.count('<span class="status bad">frames failed</span>') == 1
+
+
+def test_wires_that_were_made_from_the_traces_are_not_ok(tmp_path: Path) -> None:
+    """The traces handed back came first, ok, "that is better (skill 1.00)", above the warning."""
+    ours, theirs = write_tree(tmp_path / "simulators" / "wireval", even(0.2)), write_tree(tmp_path, even(0.001))
+    path = theirs / "cases" / "c0" / "result.json"
+    result = json.loads(path.read_text(encoding="utf-8"))
+    path.write_text(json.dumps(result | {"warnings": [f"0.001 mm: {MADE_FROM_TRACES}"]}), encoding="utf-8")
+    write_comparison(tmp_path, {"another": theirs, "wireval": ours})
+    page = render_simulators(tmp_path).read_text(encoding="utf-8")
+    assert '<span class="status bad">made from the traces</span>' in page
+    assert f"c0: 0.001 mm: {MADE_FROM_TRACES}." in page
+    assert page.count('<span class="status good">ok</span>') == 1

@@ -20,6 +20,7 @@ from pipeline.run.stages.rivals import rival_ways, rival_wires, simulated_rivals
 from pipeline.run.stages.views import compare_in_views
 from pipeline.simulate.clamp import ahead_of
 from pipeline.status import FrameStatus
+from reports.case_files import MADE_FROM_TRACES
 from solver import Solution
 
 
@@ -143,8 +144,8 @@ def _too_near(frames: Sequence[Frame]) -> list[str]:
     if not off < (NEAREST * sigma if np.isfinite(sigma) else NEAREST_MM):
         return []
     return [
-        f"the simulated wires lie {off:.2g} mm (rms) from the traced ones, {known_to}only wires that were made from "
-        "the traces, or traces from the wires, are so near; their errors say nothing about a simulator"
+        f"the simulated wires lie {off:.2g} mm (rms) from the traced ones, {known_to}{MADE_FROM_TRACES}, or "
+        "traces from the wires, are so near; their errors say nothing about a simulator"
     ]
 
 
