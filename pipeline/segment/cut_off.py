@@ -2,13 +2,15 @@
 
 import numpy as np
 
-from pipeline.arrays.grids import indices_of
-from pipeline.segment.bone import LEAST, LOOKED_AT
+from pipeline.arrays.grids import unflattened
+from pipeline.segment.bone import LEAST
 from pipeline.segment.levels import Index
 from solver.grid import Grid
 
 AT_TOP = 0.5
 """Share of the vessel's depth with the scan's greatest grey, from which the level inside is that one."""
+LOOKED_AT = 200_000
+"""Places of the vessel's box that are looked at: a few thousand lie deep in it."""
 STILL = 0.5
 """Share of voxels outside it that are what the next one is, from which a scan has no noise: its vessel may be flat."""
 
@@ -18,9 +20,12 @@ def cut_off(scan: Grid, distance: Grid, corner: Index) -> tuple[str, ...]:
 
     distance : signed distance on the vessel's box, which begins at ``corner`` of the scan.
     """
-    h = float(np.min(distance.spacing_mm))
-    deep, out = (indices_of(part) for part in (distance.values < -h, distance.values > 2.0 * h))
-    deep, out = (places[:: max(1, len(places) // LOOKED_AT)] + corner for places in (deep, out))
+    h, some = (
+        float(np.min(distance.spacing_mm)),
+        np.random.default_rng(0).integers(distance.values.size, size=LOOKED_AT),
+    )
+    depth, index = distance.values.reshape(-1)[some], unflattened(some, distance.values.shape) + corner
+    deep, out = index[depth < -h], index[depth > 2.0 * h]
     if min(len(deep), len(out)) < LEAST:
         return ()
     top = scan.values[tuple(deep.T)] == scan.values.max()

@@ -1,7 +1,7 @@
 """trace: the real wire of every frame, one crop held at a time."""
 
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -45,9 +45,10 @@ def trace_frames(run: Context, known: Known) -> Known:
         own = [as_given(run, *pair, known.lumen.distance) for pair in zip(known.frames, given, strict=True)]
         return _with_room(run, known, _in_step(run, own, voxel_mm))
     work = _Tracing(run, known, given)
-    # the wall takes a second and more with 256^3 voxels: it is made while the helpers trace
+    # the wall takes a second and more with 256^3 voxels: it is made, and the reference traced, while the helpers trace
     wall = partial(wall_of, known.lumen.distance, run.config.solver.hull) if run.goes_to("simulate") else nothing
-    parts = run.share("trace", work.part, len(known.frames), wall)
+    reference = cache(partial(wire_in_reference, run, work.reference, known.lumen))
+    parts = run.share("trace", work.part, len(known.frames), lambda: (wall(), reference()))
     for part in parts:
         run.log.add(part.log)
     frames, assumed = own_dim_ends(once([p.frame for p in parts], run.case.calibrated_scans), voxel_mm)
@@ -60,7 +61,7 @@ def trace_frames(run: Context, known: Known) -> Known:
     if not given:
         run.log.warnings += cut_off([(f.index, curve) for f in frames if (curve := f.trusted_curve) is not None])
     run.log.warnings += beside_what_is_seen(frames, [part.seen for part in parts], run.config.trace, voxel_mm)
-    run.log.warnings += wire_in_reference(run, work.reference, known.lumen)
+    run.log.warnings += reference()
     run.log.warnings += _in_plane(frames, run.config.trace.in_plane_deg)
     assumed, doubtful = sentences_of(work.alignment, {frame.index: frame.registration for frame in frames})
     run.log.assumptions += assumed
