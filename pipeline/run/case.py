@@ -136,9 +136,10 @@ def _compute(job: Job, hashed: Callable[[], None], inputs: Inputs, progress: Cas
     log = Log(progress)
     store, files = Store(job.cache, progress.warn), LumenFiles(job.folder / "view")
     begin = files.begin if job.pictures and job.cores > 1 else nothing
-    run = Context(job.case, job.settings.config, store, log, job.cores, job.until, hashed, inputs, begin)
-    if run.goes_to("simulate"):
-        load_kernels(progress)
+    kernels = functools.cache(functools.partial(load_kernels, progress))
+    run = Context(job.case, job.settings.config, store, log, job.cores, job.until, hashed, inputs, begin, kernels)
+    if run.goes_to("simulate") and (job.cores == 1 or not _compiled()):  # else while helpers trace
+        kernels()
     clock = perf_counter()
     try:
         known = run_stages(run)

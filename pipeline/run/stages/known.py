@@ -159,6 +159,7 @@ class Context:
     hashed : waits until the files are hashed, so that forked processes inherit the hashes.
     inputs : the case's files as they were when it began; nothing is stored that was made of others.
     lumen_known : called as soon as the lumen is what it will be, before the case is simulated.
+    kernels : loads the solver's compiled code, which takes half a second; once, however often it is called.
     """
 
     case: Case
@@ -170,6 +171,7 @@ class Context:
     hashed: Callable[[], object] = nothing
     inputs: Inputs = ANY
     lumen_known: Callable[[Lumen], object] = nothing
+    kernels: Callable[[], object] = nothing
 
     def goes_to(self, stage: Stage) -> bool:
         """Whether the case goes through a stage."""

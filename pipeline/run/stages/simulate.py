@@ -31,6 +31,7 @@ def simulate_frames(run: Context, known: Known) -> Known:
 
     Raises StageError where the solver refuses its inputs.
     """
+    run.kernels()
     try:
         return _simulated(run, known)
     except ValueError as error:

@@ -46,9 +46,10 @@ def trace_frames(run: Context, known: Known) -> Known:
         return _with_room(run, known, _in_step(run, own, voxel_mm))
     work = _Tracing(run, known, given)
     # the wall takes a second and more with 256^3 voxels: it is made, and the reference traced, while the helpers trace
+    kernels = run.kernels if run.goes_to("simulate") else nothing
     wall = partial(wall_of, known.lumen.distance, run.config.solver.hull) if run.goes_to("simulate") else nothing
     reference = cache(partial(wire_in_reference, run, work.reference, known.lumen))
-    parts = run.share("trace", work.part, len(known.frames), lambda: (wall(), reference()))
+    parts = run.share("trace", work.part, len(known.frames), lambda: (kernels(), wall(), reference()))
     for part in parts:
         run.log.add(part.log)
     frames, assumed = own_dim_ends(once([p.frame for p in parts], run.case.calibrated_scans), voxel_mm)
