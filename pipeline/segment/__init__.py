@@ -82,11 +82,10 @@ def segment(
     (SEGMENT_FAILED) when the seeds lie in no bright vessel. The wall is the half-level surface, blur corrected.
     """
     config = config or SegmentConfig()
-    grid, axes = in_memory_order(volume)
-    found = _found(grid, seeds_mm, config, wire_radius_mm is not None)
+    scan, axes = in_memory_order(volume)
+    found = _found(scan, seeds_mm, config, wire_radius_mm is not None)
     if wire_radius_mm is not None:
-        found = _around_wire(grid, found, seeds_mm, config, wire_radius_mm)
-    cut = cut_off(grid, found.distance, found.site.corner)
+        found = _around_wire(scan, found, seeds_mm, config, wire_radius_mm)
     grid, region, site, wall, blur = found.grid, found.region, found.site, found.wall, found.blur
     open_ones, bright = side_by_side(
         lambda: contacts(found.distance), lambda: bone.touching(grid, found.distance, site.corner, wall.levels)
@@ -95,11 +94,8 @@ def segment(
         thin = balls(grid, region.thin, site.corner, region.levels, blur)
         add_balls(wall.values, np.asarray(grid.spacing_mm), thin, config.outer_mm)
     other = brighter(wall.levels) + bright + uneven.warning(found.least)
-    said = (
-        cut
-        + warning(open_ones)
-        + (other or bone.two_greys(grid, found.distance, site.corner, wall.levels, wall.blur_mm))
-    )
+    said = cut_off(scan, found.distance, site.corner) + warning(open_ones)
+    said += other or bone.two_greys(grid, found.distance, site.corner, wall.levels, wall.blur_mm)
     box = wall.values, site.corner
     said += add_necks(region.necks, box, grid, region.levels, blur)
     said += add_necks(closed_necks(*box, grid, config.least_voxels), box, grid, region.levels, blur)

@@ -20,10 +20,8 @@ def cut_off(scan: Grid, distance: Grid, corner: Index) -> tuple[str, ...]:
 
     distance : signed distance on the vessel's box, which begins at ``corner`` of the scan.
     """
-    h, some = (
-        float(np.min(distance.spacing_mm)),
-        np.random.default_rng(0).integers(distance.values.size, size=LOOKED_AT),
-    )
+    h = float(np.min(distance.spacing_mm))
+    some = np.random.default_rng(0).integers(distance.values.size, size=LOOKED_AT)
     depth, index = distance.values.reshape(-1)[some], unflattened(some, distance.values.shape) + corner
     deep, out = index[depth < -h], index[depth > 2.0 * h]
     if min(len(deep), len(out)) < LEAST:
