@@ -17,6 +17,9 @@ from pipeline.trace.verdict import LEAST_SEEN, note_of
 from pipeline.trace.ways import goes_on_unseen
 from pipeline.trace.whose_end import nothing_beyond, of_one_device, of_one_line
 
+OWN_NOISE = 0.25
+"""Share of what counts as noise that changes from voxel to voxel, below which the rest is no noise: white noise has 1,
+noise correlated over 1.5 voxels 0.32. Frames of another phantom or contrast than their reference had 0.19."""
 BLURRED = 2.0 / 3.0
 """Share of the wire's peak that the blur in which grey is read leaves where FAINTEST holds: it leaves 0.65 of a wire as
 blurred as 0.95 voxel, and 0.42 of one of 0.6 voxel, which is looked for that much lower."""
@@ -32,6 +35,13 @@ def _traces_of_wire(image: Subtraction) -> bool:
     return up > 3 * max(down, 5)
 
 
+def _of_the_scan(image: Subtraction) -> float:
+    """Standard deviation of the grey from one voxel to the next within the lumen: noise without what changes slowly."""
+    within = image.region.within
+    steps = np.diff(image.grey.reshape(-1)[within].astype(float))[np.diff(within) == 1]
+    return spread(steps) / float(np.sqrt(2.0)) if len(steps) else float("inf")
+
+
 def no_wire(image: Subtraction) -> Curve:
     """The empty curve, with status and note, of a frame in which no line passes the entry."""
     status, allowed = FrameStatus.NO_WIRE, f"a bright line in the lumen within {ENTRY_REACH_MM} mm of entry_mm"
@@ -40,6 +50,11 @@ def no_wire(image: Subtraction) -> Curve:
         status, allowed = FrameStatus.TRACE_LOW_CONTRAST, "a contrast of 2.5 noises"
         do = f"{do}; list a frame of a smaller depth before it, or scan with more dose"
     got = f"nothing that stands out of {image.noise:.0f} grey of noise and passes the entry"
+    if (own := _of_the_scan(image)) < OWN_NOISE * image.noise:
+        got += (
+            f" ({own:.0f} of them from voxel to voxel: the rest is no noise, but what the background does not explain)"
+        )
+        do = f"check that the reference is of this phantom, in this place and of this contrast; {do}"
     return Curve(
         np.zeros((0, 3)), np.zeros(0), status=status, note=note_of(got, allowed, do),
         counters=image.counters, levels=image.levels,

@@ -138,6 +138,18 @@ def test_what_cannot_be_told_is_refused(case, seed, status):
         assert "check that the frame shows a wire" in row.text
 
 
+@pytest.mark.parametrize("other", [True, False])
+def test_a_reference_of_another_phantom_is_named(other: bool):
+    """It was 500 grey of noise, where there were 60, and the advice to look at the entry."""
+    scene = Draft(np.random.default_rng(5)).scan(40)
+    lumen, values = segment(scene.reference, scene.entry[None]), scene.reference.values
+    reference = replace(scene.reference, values=np.ascontiguousarray(values[::-1]) if other else values)
+    frame = scene.frame if other else scene.reference
+    curve = trace(frame, lumen, scene.entry, scene.direction, reference=reference)
+    assert curve.status is FrameStatus.NO_WIRE
+    assert ("check that the reference is of this phantom" in curve.note) is other
+
+
 def test_a_stated_depth_does_not_hide_that_the_direction_is_turned_round():
     """It was a length that disagrees, to be corrected in the manifest."""
     row = look("entry_direction the wrong way round", 3, expected_mm=30.0)
