@@ -11,6 +11,9 @@ CHANCE = 1e-3
 LEAST_DEG = 3.0
 """Rolls that are nearer together are no fault of the manifest: nobody sets a torque device better."""
 
+LINEAR_DEG = 60.0
+"""How far apart they are known to be by derivatives: 90 degrees came out as 77 to 103, 180 as 241."""
+
 
 def own_rolls(fit: Fit) -> dict[str, tuple[float, float]]:
     """By insertion, how far its traces alone would turn the common roll, degrees, and its standard deviation.
@@ -47,5 +50,7 @@ def no_common_roll(fit: Fit) -> str:
     if chdtrc(len(found) - 1, float(np.sum(((shifts - middle) / sds) ** 2))) > CHANCE:
         return ""
     low, high = (list(found)[int(place)] for place in (np.argmin(shifts), np.argmax(shifts)))
-    apart = f"{high} wants {np.ptp(shifts):.0f} degrees more than {low}"
+    # far from where it is linearised, it is another roll, and nobody knows which
+    by = f"{np.ptp(shifts):.0f} degrees more" if np.ptp(shifts) < LINEAR_DEG else "quite another roll"
+    apart = f"{high} wants {by} than {low}"
     return f"the insertions want no common one: {apart}; check roll_deg of each (degrees) and material_axis"

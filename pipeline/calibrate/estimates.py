@@ -87,7 +87,7 @@ def calibrated(free: Sequence[Unknown], evidence: Sequence[Evidence], solver: So
     return Calibration(estimates, correlation, tuple(_errors(last)), last, last.linear.scale)
 
 
-def _judged(unknown: Unknown, fit: Fit, profile: tuple[tuple[float, float], ...], apart: str) -> Estimate:
+def _judged(unknown: Unknown, fit: Fit, profile: tuple[tuple[float, float], ...], apart: str = "") -> Estimate:
     """The estimate of a parameter, which says whether it is seen and, if not, why. apart : that no value is common."""
     value, sd = fit.values[unknown.name], fit.sd[unknown.name]
     why = apart or _unseen(unknown, value, sd, profile)

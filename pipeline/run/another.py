@@ -87,7 +87,9 @@ def _with_another(case: Found, shared: Sequence[Found], traces: Mapping[str, Tra
 
 def _reach_mm(traces: Traces, otherwise: float) -> float:
     """How far off in depth a trace of a case may be to be a guess. otherwise : where the case has one alone."""
-    steps = np.abs(np.diff(sorted(depth for depth, _ in traces.values())))
+    numbers = sorted(traces)
+    # over the frames that were lost between two, too: they do not make its frames farther apart
+    steps = np.abs(np.diff([traces[number][0] for number in numbers])) / np.diff(numbers)
     return max(NEAREST_MM, 0.5 * float(np.median(steps))) if len(steps) else otherwise
 
 

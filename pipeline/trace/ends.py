@@ -119,8 +119,6 @@ def of_the_ends(image: Subtraction, attempt: Attempt, points: Array, length_mm: 
     back_mm, on_mm, sure_mm = _end_range(image, attempt)
     step = length_mm / max(1, len(points) - 1)
     folded = beside_itself(points, step, TIP_BESIDE * image.voxel)
-    known = attempt.tube.steps.stated or image.thick_slices
-    wide = 0.0 if known or folded[-1] else wide_end(image, attempt.tube, points)
     return (
         (missing_mm > 0.0, FrameStatus.TRACE_AMBIGUOUS,
          f"a line that ends {missing_mm:.1f} mm before the tip, by the wire's opacity", "one that goes to the tip",
@@ -134,10 +132,6 @@ def of_the_ends(image: Subtraction, attempt: Attempt, points: Array, length_mm: 
         (dark_ahead(image, points), FrameStatus.TRACE_AMBIGUOUS,
          "a dark line ahead of the curve's end", "a tip with nothing beyond it",
          "look whether the wire goes on, less dense than the contrast medium: its end is not seen then"),
-        (wide > 0.0, FrameStatus.TRACE_AMBIGUOUS,
-         f"an end {wide:.2f} times as wide as the line before it", f"{WIDE[0]:g} times at most",
-         "look whether something else is at the tip (a bead, an air bubble of the reference, contrast medium that it "
-         "lacks); state the wire's opacity if its own end is so thick"),
         (max(back_mm, on_mm) > sure_mm, FrameStatus.TRACE_AMBIGUOUS,
          f"a faint end that may lie {back_mm:.1f} mm further back or {on_mm:.1f} mm further on",
          f"{sure_mm:.1f} mm", _against_dim_ends(attempt)),
@@ -155,6 +149,19 @@ def of_the_ends(image: Subtraction, attempt: Attempt, points: Array, length_mm: 
         (bool(folded[-1]) and not attempt.from_previous, FrameStatus.TRACE_AMBIGUOUS,
          "a tip beside another strand of the wire", f"{TIP_BESIDE} voxels between them",
          "list a frame of a smaller depth before it, or look where the wire ends"),
+    )  # fmt: skip
+
+
+def of_its_width(image: Subtraction, attempt: Attempt, points: Array) -> tuple[Objection, ...]:
+    """Why a curve's (n, 3) end may be something else than the wire's. Beside another strand nobody sees its width."""
+    step = float(np.mean(np.linalg.norm(np.diff(points, axis=0), axis=1)))
+    beside = image.thick_slices or bool(beside_itself(points, step, TIP_BESIDE * image.voxel)[-1])
+    wide = 0.0 if beside else wide_end(image, attempt.tube, points)
+    return (
+        (wide > 0.0, FrameStatus.TRACE_AMBIGUOUS,
+         f"an end {wide:.2f} times as wide as the line before it", f"{WIDE[0]:g} times at most",
+         "look whether something else is at the tip (a bead, an air bubble of the reference, contrast medium that it "
+         "lacks); if the wire's own end is so thick, give its curve (traces)"),
     )  # fmt: skip
 
 

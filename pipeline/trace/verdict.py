@@ -12,7 +12,7 @@ from pipeline.arrays.polyline import at_arc
 from pipeline.model import Array, arc_length
 from pipeline.status import FrameStatus
 from pipeline.trace.attempt import Attempt, tube_length
-from pipeline.trace.ends import Objection, beside_itself, of_a_pair, of_the_ends, of_the_way, of_the_whole
+from pipeline.trace.ends import Objection, beside_itself, of_a_pair, of_its_width, of_the_ends, of_the_way, of_the_whole
 from pipeline.trace.link import extended, resampled
 from pipeline.trace.profile import LEAST_LEVEL, Steps
 from pipeline.trace.section import out_of_round, paired
@@ -172,7 +172,8 @@ def judge(image: Subtraction, attempt: Attempt, points: Array, bridged: NDArray[
     objections += _of_the_line(image, attempt, points, (share, noise, outside), (faint_mm, double_mm, length_mm))
     pair = 0.0 if image.thick_slices else paired(image, oblong, doubtful, length_mm)
     objections += of_a_pair(pair, attempt)
-    objections += of_the_ends(image, attempt, points, length_mm) + of_the_whole(image, attempt, points, length_mm)
+    objections += of_the_ends(image, attempt, points, length_mm) + of_its_width(image, attempt, points)
+    objections += of_the_whole(image, attempt, points, length_mm)
     first = next(((status, note_of(*why)) for holds, status, *why in objections if holds), (FrameStatus.OK, ""))
     return Verdict(*first, bridged | faint | double | outside, faint_mm, double_mm)
 

@@ -91,7 +91,7 @@ def test_the_row_over_all_rests_on_the_insertions(out: Path) -> None:
 @pytest.mark.parametrize(
     ("stated", "wrong", "said"),
     [
-        ("roll_deg = ", "roll_deg = 150.0 #", "turned by 210 degrees"),
+        ("roll_deg = ", "roll_deg = 150.0 #", "turned by -150 degrees"),
         (
             "rest_curvature_per_mm = [[0.0, 0.12], [8.0, 0.12]",
             "rest_curvature_per_mm = [[0.0, -0.12], [8.0, -0.12]",
@@ -250,6 +250,9 @@ def test_a_lost_trace_makes_no_guess_worse(out: Path) -> None:
     assert set(after[2].guesses) == {kept}
     assert after[2].guesses[kept] == before[2].guesses[kept]
     assert not with_another(out, [found[0], *lost[1:]])[0].frames[2].guesses
+    # nor does what is lost of every second frame make those that are left farther apart
+    half = [replace(c, traced_mm={n: d for n, d in c.traced_mm.items() if n % 2 == 0}) for c in found]
+    assert not with_another(out, [found[0], *half[1:]])[0].frames[1].guesses
 
 
 def test_what_the_wire_ends_with_is_pooled_over_its_points(out: Path) -> None:

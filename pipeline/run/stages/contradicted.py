@@ -80,10 +80,11 @@ def _nearest(
 def _said(where: str, other_mm: float, stated_mm: float, way: Way) -> str:
     """The warning, with what to look at."""
     how, do = {
-        TIP_CURVE: ("straight at rest", "rest_curvature_per_mm, its sign and unit, and roll_deg"),
+        TIP_CURVE: ("straight at rest", "rest_curvature_per_mm and roll_deg"),
         ROLL: (
-            f"turned by {way.turn_deg:g} degrees",
-            "roll_deg (degrees), material_axis, the tip's sign and the axes (LPS or RAS)",
+            f"turned by {(way.turn_deg + 179.0) % 360.0 - 179.0:+g} degrees",
+            "roll_deg (degrees), material_axis, the tip's sign, the axes (LPS or RAS) and, with friction, "
+            "torsional_stiffness_N_mm2",
         ),
         CATHETER: ("without the catheter", "whether the scans show one, its stiffness and its insertion_mm"),
     }[way.without]
