@@ -34,18 +34,9 @@ from reports.page import Each, begun_first, draw_sections, longest, one_by_one, 
 from reports.schema import ERRORS, FAILURES, OVERALL_FILE, SIMULATORS, SUMMARY, SWEEP
 from reports.sweep import silent_points
 from reports.tables import read_if_there
-from reports.verdict import (
-    OF_CALIBRATION,
-    badge,
-    next_command,
-    typed,
-    unscored,
-    verdict,
-    worse_cases,
-    worse_sentence,
-    worst_frames,
-)
+from reports.verdict import OF_CALIBRATION, badge, next_command, typed, unscored, verdict, worst_frames
 from reports.viewer import viewer_data
+from reports.worse import worse_cases, worse_sentence
 
 PHYSICS = ("wire", "catheter", "down", "wall", "entry", "chosen", "geometry")
 

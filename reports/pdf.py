@@ -29,7 +29,8 @@ from reports.origin import mixed_settings
 from reports.pdf_page import RIGHT, WIDE, Figured, Page
 from reports.schema import FAILURES, OVERALL_FILE, SUMMARY
 from reports.tables import read_if_there
-from reports.verdict import next_command, typed, unscored, verdict, worse_sentence, worst_frames
+from reports.verdict import next_command, typed, unscored, verdict, worst_frames
+from reports.worse import worse_sentence
 
 _MOST_FAILURES, _MOST_CASES, _MOST_SETTINGS = 8, 40, 24
 _MOST_WARNINGS, _FOR_ASSUMPTIONS = 4, 0.25

@@ -9,7 +9,7 @@ from typing import Any
 import pandas as pd
 
 from reports._content import NOTHING, fewer_frames, interval, number, predictor_label
-from reports.case_files import WORST, counted, listed, read_json, results_in, said_by_cases
+from reports.case_files import WORST, counted, read_json, results_in, said_by_cases
 from reports.schema import SUMMARY
 
 _MANY = 5
@@ -105,25 +105,6 @@ def badge(status: str, good: bool, statistics: Mapping[str, Any]) -> dict[str, s
     """
     poor = standing(statistics) if good else ""
     return {"text": poor or status, "look": "poor" if poor else "good" if good else "bad"}
-
-
-def worse_cases(rows: Iterable[Mapping[Any, Any]]) -> list[str]:
-    """Cases that are scored and whose wire is worse than a guess, which a number over all cases hides.
-
-    rows : of summary.csv.
-    """
-    return [str(row["case"]) for row in _scored(rows) if standing(row) == WORSE]
-
-
-def worse_sentence(rows: Sequence[Mapping[Any, Any]]) -> str:
-    """These cases in a sentence; empty where there are none, or one case alone, of which all else speaks."""
-    worse, scored = worse_cases(rows), len(_scored(rows))
-    are = "is" if len(worse) == 1 else "are"
-    return f"{len(worse)} of {scored} cases {are} {WORSE}: {listed(worse)}." if worse and scored > 1 else ""
-
-
-def _scored(rows: Iterable[Mapping[Any, Any]]) -> list[Mapping[Any, Any]]:
-    return [row for row in rows if row.get("role") != "calibration" and number(row.get("rms_mm")) != NOTHING]
 
 
 OF_CALIBRATION = (

@@ -20,7 +20,8 @@ from reports.origin import mixed_settings
 from reports.schema import SWEEP
 from reports.sweep import silent_points
 from reports.tables import read_if_there
-from reports.verdict import in_short, next_command, worse_sentence
+from reports.verdict import in_short, next_command
+from reports.worse import worse_sentence
 
 
 def failure_lines(plan: Plan, then: str = "") -> list[str]:

@@ -7,17 +7,8 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from reports.verdict import (
-    badge,
-    in_short,
-    next_command,
-    typed,
-    unscored,
-    verdict,
-    warned,
-    worse_sentence,
-    worst_frames,
-)
+from reports.verdict import badge, in_short, next_command, typed, unscored, verdict, warned, worst_frames
+from reports.worse import worse_sentence
 from tests.reports.fake_results import FakeCase, write_run
 
 
@@ -242,6 +233,17 @@ def test_cases_that_are_worse_than_a_guess_are_named() -> None:
     assert worse_sentence([row, worse | {"skill_strongest": -0.05}]) == "", "that is no better, and not worse"
     assert worse_sentence([row, worse | {"role": "calibration"}]) == ""
     assert worse_sentence([worse]) == "", "all else on the page speaks of this case"
+
+
+@pytest.mark.parametrize(("rms_mm", "said"), [(0.51, "c lies 6 times as far off"), (0.3, ""), (0.51, "")])
+def test_a_case_that_lies_far_off_is_named(rms_mm: float, said: str) -> None:
+    """A roll in radians made the interval 0.006 to 42 mm, and the advice was to scan more."""
+    rows = [{"case": name, "rms_mm": 0.08, "skill_strongest": 0.9, "strongest_null": "previous"} for name in "abc"]
+    rows[2]["rms_mm"] = rms_mm
+    if not said and rms_mm > 0.5:
+        rows = rows[1:]  # of two nobody knows which is the odd one
+    assert worse_sentence(rows).startswith(said)
+    assert bool(worse_sentence(rows)) is bool(said)
 
 
 def test_a_wide_interval_is_said_to_be_the_doing_of_few_insertions() -> None:
