@@ -10,7 +10,6 @@ CHANCE = 1e-3
 """Probability below which insertions that want one roll are not so far apart."""
 LEAST_DEG = 3.0
 """Rolls that are nearer together are no fault of the manifest: nobody sets a torque device better."""
-
 LINEAR_DEG = 60.0
 """How far apart they are known to be by derivatives: 90 degrees came out as 77 to 103, 180 as 241."""
 
@@ -22,18 +21,17 @@ def own_rolls(fit: Fit) -> dict[str, tuple[float, float]]:
     """
     problem, linear, k = fit.problem, fit.linear, [u.name for u in fit.problem.free].index(ROLL)
     means, sigmas = problem.prior
-    (residuals,) = problem.residuals([linear.x], linear.weights, linear.scale)
+    of_each = zip(problem.evidence, problem.parts(), linear.jacobian, linear.residual, strict=True)
     found = {}
-    for one, part, jacobian, rest in zip(problem.evidence, problem.parts(), linear.jacobian, residuals, strict=True):
+    for one, part, jacobian, rest in of_each:
         own = [i for i in range(part.start, part.stop) if sigmas[i] > 0.0]
         columns = jacobian[:, [k, *own]]
         precision = np.concatenate([[0.0], sigmas[own] ** -2.0])
         normal = columns.T @ columns + np.diag(precision)
         if one.trial.roll_free or not normal[0, 0] > 0.0:
             continue
-        wanted = np.linalg.solve(
-            normal, columns.T @ rest + precision * np.concatenate([[0.0], (means - linear.x)[own]])
-        )
+        from_prior = np.concatenate([[0.0], (means - linear.x)[own]])
+        wanted = np.linalg.solve(normal, columns.T @ rest + precision * from_prior)
         found[one.trial.name] = float(wanted[0]), float(np.sqrt(np.linalg.inv(normal)[0, 0]))
     return found
 

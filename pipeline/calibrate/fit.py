@@ -23,13 +23,14 @@ DAMPINGS = (1.0, 10.0)
 
 @dataclass(frozen=True, eq=False)
 class Linear:
-    """The problem linearised at a vector x (p,): whitened derivatives of every insertion, weights, and their scale.
+    """The problem linearised at a vector x (p,): whitened residuals and derivatives of every insertion, weights, scale.
 
     normal : normal matrix (p, p) with the priors.     right : (p,), minus half the gradient.     value : of the
     objective.
     """
 
     x: Array
+    residual: list[Array]
     jacobian: list[Array]
     normal: Array
     right: Array
@@ -156,7 +157,7 @@ class Problem:
             normal, right = normal + j.T @ j, right + j.T @ r
             jacobians.append(j)
             residuals.append(r)
-        return Linear(x, jacobians, normal, right, self.value(x, residuals), weights, scale)
+        return Linear(x, residuals, jacobians, normal, right, self.value(x, residuals), weights, scale)
 
     def solved(self, x: Array, rounds: int = ROUNDS) -> Linear:
         """The problem linearised at the vector of least objective, found from the vector ``x``."""

@@ -103,7 +103,8 @@ class Others:
         self.traces = [(n, name, *trace) for n, (name, traces) in enumerate(cases) for trace in traces.values()]
         self.depths_mm = np.array([depth for _, _, depth, _ in self.traces])
         usual = _reach_mm(own, NEAREST_MM)
-        self.reach_mm = np.array([_reach_mm(traces, usual) for _, traces in cases for _ in traces])
+        reach_mm = [_reach_mm(traces, usual) for _, traces in cases]
+        self.reach_mm = np.repeat(reach_mm, [len(traces) for _, traces in cases])
 
     def nearest(self, depth_mm: float, curve: Array) -> list[tuple[str, Array]]:
         """The trace of nearest depth of each other case, with its insertion, unless it begins elsewhere.

@@ -113,12 +113,12 @@ def _against_dim_ends(attempt: Attempt) -> str:
     return "state the wire's opacity, whose steps tell where its end is, or scan with more dose"
 
 
-def of_the_ends(image: Subtraction, attempt: Attempt, points: Array, length_mm: float) -> tuple[Objection, ...]:
-    """What may be wrong with where a curve (n, 3) begins and ends."""
+def of_the_ends(
+    image: Subtraction, attempt: Attempt, points: Array, length_mm: float, *, folded: bool
+) -> tuple[Objection, ...]:
+    """What may be wrong with where a curve (n, 3) begins and ends. folded : its tip lies beside another strand."""
     missing_mm = attempt.tube.steps.missing_mm
     back_mm, on_mm, sure_mm = _end_range(image, attempt)
-    step = length_mm / max(1, len(points) - 1)
-    folded = beside_itself(points, step, TIP_BESIDE * image.voxel)
     return (
         (missing_mm > 0.0, FrameStatus.TRACE_AMBIGUOUS,
          f"a line that ends {missing_mm:.1f} mm before the tip, by the wire's opacity", "one that goes to the tip",
@@ -146,17 +146,20 @@ def of_the_ends(image: Subtraction, attempt: Attempt, points: Array, length_mm: 
          f"a lumen that ends at {_named(image, points[-1])} mm, and something bright beyond it",
          "a lumen that holds the tip",
          "look whether the vessel goes on there (segment.threshold, lumen), or bone touches it"),
-        (bool(folded[-1]) and not attempt.from_previous, FrameStatus.TRACE_AMBIGUOUS,
+        (folded and not attempt.from_previous, FrameStatus.TRACE_AMBIGUOUS,
          "a tip beside another strand of the wire", f"{TIP_BESIDE} voxels between them",
          "list a frame of a smaller depth before it, or look where the wire ends"),
     )  # fmt: skip
 
 
-def of_its_width(image: Subtraction, attempt: Attempt, points: Array) -> tuple[Objection, ...]:
-    """Why a curve's (n, 3) end may be something else than the wire's. Beside another strand nobody sees its width."""
-    step = float(np.mean(np.linalg.norm(np.diff(points, axis=0), axis=1)))
-    beside = image.thick_slices or bool(beside_itself(points, step, TIP_BESIDE * image.voxel)[-1])
-    wide = 0.0 if beside else wide_end(image, attempt.tube, points)
+def of_its_width(
+    image: Subtraction, attempt: Attempt, points: Array, read: tuple[Array, Array], *, folded: bool
+) -> tuple[Objection, ...]:
+    """Why a curve's (n, 3) end may be something else than the wire's. Beside another strand nobody sees its width.
+
+    read, folded : of ``read_around``, as in ``of_the_ends``.
+    """
+    wide = 0.0 if image.thick_slices or folded else wide_end(image, attempt.tube, points, read)
     return (
         (wide > 0.0, FrameStatus.TRACE_AMBIGUOUS,
          f"an end {wide:.2f} times as wide as the line before it", f"{WIDE[0]:g} times at most",

@@ -11,6 +11,7 @@ from pipeline.trace.profile import INDEPENDENT_VOXELS
 from pipeline.trace.subtraction import CREST_VOXELS, Subtraction
 
 ANGLES = 12
+PHI = 2 * np.pi * np.arange(ANGLES) / ANGLES
 RING_BLURS = 1.4
 """Radius of the ring in blurs of the line: where two strands differ most from one that is as wide."""
 OVER_MM = 3.0
@@ -37,31 +38,37 @@ def carried(tangents: Array) -> tuple[Array, Array]:
     return first, np.cross(tangents, first)
 
 
-def out_of_round(image: Subtraction, points: Array, sigma: float) -> tuple[Array, float]:
+def _ring(points: Array, radius: float) -> Array:
+    """Points (ANGLES, n, 3) on a ring about each point of a curve (n, 3)."""
+    t = np.gradient(points, axis=0)
+    t /= np.linalg.norm(t, axis=1)[:, None]
+    u, v = carried(t)
+    return points + radius * (np.cos(PHI)[:, None, None] * u + np.sin(PHI)[:, None, None] * v)
+
+
+def read_around(image: Subtraction, points: Array, sigma: float) -> tuple[Array, Array]:
+    """Grey on a ring of RING_BLURS blurs about each point of a curve (n, 3), and on its axis: (ANGLES, n) and (n,)."""
+    ring = image.along(_ring(points, RING_BLURS * sigma).reshape(-1, 3))
+    return ring.reshape(ANGLES, len(points)), image.along(points)
+
+
+def out_of_round(image: Subtraction, points: Array, read: tuple[Array, Array]) -> tuple[Array, float]:
     """Second harmonic (n,) of the ring's grey over the grey on the axis, along a curve (n, 3), and its noise where the
     wire has its usual height.
+
+    read : of ``read_around``.
     """
+    ring, grey = read
     step = float(np.mean(np.linalg.norm(np.diff(points, axis=0), axis=1)))
-    phi, grey = rings(image, points, RING_BLURS * sigma)
-    harmonic = 2.0 / ANGLES * np.exp(2j * phi) @ grey
+    harmonic = 2.0 / ANGLES * np.exp(2j * PHI) @ ring
     width = min(len(points), max(1, round(OVER_MM / step)))
     window = np.ones(width) / width
-    axis = np.convolve(image.along(points), window, "same")
+    axis = np.convolve(grey, window, "same")
     usual = float(np.median(axis))
     smooth = np.abs(np.convolve(harmonic, window, "same")) / np.maximum(axis, max(0.3 * usual, 1e-9))
     independent = max(1.0, min(OVER_MM, width * step) / (INDEPENDENT_VOXELS * image.voxel))
     noise = image.noise_in(CREST_VOXELS) * np.sqrt(4.0 / ANGLES / independent) / max(usual, 1e-9)
     return np.asarray(smooth, float), float(noise)
-
-
-def rings(image: Subtraction, points: Array, radius: float) -> tuple[Array, Array]:
-    """Angles (a,), and the grey (a, n) on a ring about each point of a curve (n, 3)."""
-    t = np.gradient(points, axis=0)
-    t /= np.linalg.norm(t, axis=1)[:, None]
-    u, v = carried(t)
-    phi = 2 * np.pi * np.arange(ANGLES) / ANGLES
-    ring = radius * (np.cos(phi)[:, None, None] * u + np.sin(phi)[:, None, None] * v)
-    return phi, image.along((points + ring).reshape(-1, 3)).reshape(ANGLES, len(points))
 
 
 def paired(image: Subtraction, oblong: Array, noise: float, length_mm: float) -> float:
@@ -84,9 +91,5 @@ def fills_vessel(image: Subtraction, points: Array, sigma: float) -> bool:
     radius = 2.0 * float(np.sqrt(max(0.0, sigma**2 - image.wall_blur_mm**2)))
     if radius < image.voxel:
         return False
-    t = np.gradient(points, axis=0)
-    u, v = carried(t / np.linalg.norm(t, axis=1)[:, None])
-    phi = 2 * np.pi * np.arange(ANGLES) / ANGLES
-    ring = 1.4 * radius * (np.cos(phi)[:, None, None] * u + np.sin(phi)[:, None, None] * v)
-    outside = image.depth_at((points + ring).reshape(-1, 3)).reshape(ANGLES, -1) > 0
+    outside = image.depth_at(_ring(points, 1.4 * radius).reshape(-1, 3)).reshape(ANGLES, -1) > 0
     return bool(np.mean(outside.all(axis=0)) > 0.5)

@@ -12,10 +12,19 @@ from pipeline.arrays.polyline import at_arc
 from pipeline.model import Array, arc_length
 from pipeline.status import FrameStatus
 from pipeline.trace.attempt import Attempt, tube_length
-from pipeline.trace.ends import Objection, beside_itself, of_a_pair, of_its_width, of_the_ends, of_the_way, of_the_whole
+from pipeline.trace.ends import (
+    TIP_BESIDE,
+    Objection,
+    beside_itself,
+    of_a_pair,
+    of_its_width,
+    of_the_ends,
+    of_the_way,
+    of_the_whole,
+)
 from pipeline.trace.link import extended, resampled
 from pipeline.trace.profile import LEAST_LEVEL, Steps
-from pipeline.trace.section import out_of_round, paired
+from pipeline.trace.section import out_of_round, paired, read_around
 from pipeline.trace.subtraction import CREST_VOXELS, Subtraction
 from pipeline.trace.tube import Tube
 
@@ -161,7 +170,8 @@ def judge(image: Subtraction, attempt: Attempt, points: Array, bridged: NDArray[
     ends = np.minimum(np.arange(len(points)), np.arange(len(points))[::-1]) * step
     known = seen_steps(attempt.tube.steps, _shares(attempt.tube, points))
     faint = (share < FAINT + noise) & (ends > MEAN_OVER_MM) & ~known
-    oblong, doubtful = out_of_round(image, points, attempt.tube.sigma)
+    read = read_around(image, points, attempt.tube.sigma)
+    oblong, doubtful = out_of_round(image, points, read)
     double = beside_itself(points, step, BESIDE_VOXELS * image.voxel)
     if not image.thick_slices:
         alone = share / _of_one_strand(share, (ends > MEAN_OVER_MM) & ~bridged & ~faint)
@@ -172,7 +182,9 @@ def judge(image: Subtraction, attempt: Attempt, points: Array, bridged: NDArray[
     objections += _of_the_line(image, attempt, points, (share, noise, outside), (faint_mm, double_mm, length_mm))
     pair = 0.0 if image.thick_slices else paired(image, oblong, doubtful, length_mm)
     objections += of_a_pair(pair, attempt)
-    objections += of_the_ends(image, attempt, points, length_mm) + of_its_width(image, attempt, points)
+    folded = bool(beside_itself(points, step, TIP_BESIDE * image.voxel)[-1])
+    objections += of_the_ends(image, attempt, points, length_mm, folded=folded)
+    objections += of_its_width(image, attempt, points, read, folded=folded)
     objections += of_the_whole(image, attempt, points, length_mm)
     first = next(((status, note_of(*why)) for holds, status, *why in objections if holds), (FrameStatus.OK, ""))
     return Verdict(*first, bridged | faint | double | outside, faint_mm, double_mm)

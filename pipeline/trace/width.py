@@ -4,7 +4,7 @@ import numpy as np
 
 from pipeline.model import Array, arc_length
 from pipeline.trace.profile import INDEPENDENT_VOXELS
-from pipeline.trace.section import RING_BLURS, rings
+from pipeline.trace.section import RING_BLURS, read_around
 from pipeline.trace.subtraction import CREST_VOXELS, Subtraction
 from pipeline.trace.tube import Tube
 
@@ -16,16 +16,17 @@ and where it is modelled. Of 250 right traces none was beyond 1.15 and 3 in the 
 J tips of 1.2 to 2 voxels radius had 1.17. A bead, a bubble or a jet of contrast medium at the tip has 1.22 to 1.8."""
 
 
-def wide_end(image: Subtraction, tube: Tube, points: Array) -> float:
+def wide_end(image: Subtraction, tube: Tube, points: Array, read: tuple[Array, Array]) -> float:
     """How much wider than the wire is the end of the curve (n, 3) along it; 0 where that is not sure, or not too much.
 
     What the tube itself looks like, read the same way, takes out how the curve bends and ends, and the blur of reading.
+    read : of ``read_around``.
     """
     radius, arc = RING_BLURS * tube.sigma, arc_length(points)
     from_end = (arc[-1] - arc) / image.voxel
-    seen = _ring_and_axis(image, points, radius)
+    seen = _ring_and_axis(read)
     with image.showing(tube.voxels, image.grey.reshape(-1)[tube.voxels] - tube.rest):
-        fitted = _ring_and_axis(image, points, radius)
+        fitted = _ring_and_axis(read_around(image, points, tube.sigma))
     body = from_end > BODY_VOXELS
     if not body.any():
         return 0.0
@@ -44,9 +45,9 @@ def wide_end(image: Subtraction, tube: Tube, points: Array) -> float:
     return max(found)
 
 
-def _ring_and_axis(image: Subtraction, points: Array, radius: float) -> Array:
-    """Mean grey on a ring about each point of a curve (n, 3), and the grey on it: (2, n)."""
-    return np.stack([rings(image, points, radius)[1].mean(axis=0), image.along(points)])
+def _ring_and_axis(read: tuple[Array, Array]) -> Array:
+    """Mean grey on the ring about each point of a curve, and the grey on it: (2, n)."""
+    return np.stack([read[0].mean(axis=0), read[1]])
 
 
 def _share(ring_and_axis: Array) -> float:

@@ -1,7 +1,7 @@
 """trace: the real wire of every frame, one crop held at a time."""
 
 from dataclasses import replace
-from functools import cache, partial
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -12,7 +12,7 @@ from pipeline.load import Crop, Header
 from pipeline.model import Curve, Volume
 from pipeline.register import Motion
 from pipeline.register.frames import Alignment, alignment_of, counters_of, put_in_place, sentences_of
-from pipeline.run.helpers import Earlier, nothing
+from pipeline.run.helpers import Earlier
 from pipeline.run.log import Log
 from pipeline.run.projections import grey_window, projections
 from pipeline.run.stages.before import NOTHING, Before
@@ -45,11 +45,7 @@ def trace_frames(run: Context, known: Known) -> Known:
         own = [as_given(run, *pair, known.lumen.distance) for pair in zip(known.frames, given, strict=True)]
         return _with_room(run, known, _in_step(run, own, voxel_mm))
     work = _Tracing(run, known, given)
-    # the wall takes a second and more with 256^3 voxels: it is made, and the reference traced, while the helpers trace
-    kernels = run.kernels if run.goes_to("simulate") else nothing
-    wall = partial(wall_of, known.lumen.distance, run.config.solver.hull) if run.goes_to("simulate") else nothing
-    reference = cache(partial(wire_in_reference, run, work.reference, known.lumen))
-    parts = run.share("trace", work.part, len(known.frames), lambda: (kernels(), wall(), reference()))
+    parts = run.share("trace", work.part, len(known.frames), work.meanwhile)
     for part in parts:
         run.log.add(part.log)
     frames, assumed = own_dim_ends(once([p.frame for p in parts], run.case.calibrated_scans), voxel_mm)
@@ -62,7 +58,7 @@ def trace_frames(run: Context, known: Known) -> Known:
     if not given:
         run.log.warnings += cut_off([(f.index, curve) for f in frames if (curve := f.trusted_curve) is not None])
     run.log.warnings += beside_what_is_seen(frames, [part.seen for part in parts], run.config.trace, voxel_mm)
-    run.log.warnings += reference()
+    run.log.warnings += work.wire_in_reference
     run.log.warnings += _in_plane(frames, run.config.trace.in_plane_deg)
     assumed, doubtful = sentences_of(work.alignment, {frame.index: frame.registration for frame in frames})
     run.log.assumptions += assumed
@@ -123,6 +119,18 @@ class _Tracing:
                 switched_on=settings.register == "auto",
                 own_curves=bool(given),
             )
+
+    @cached_property
+    def wire_in_reference(self) -> list[str]:
+        """A warning where the reference shows a wire, too."""
+        return wire_in_reference(self.run, self.reference, self.lumen)
+
+    def meanwhile(self) -> None:
+        """Make what is needed soon, while helpers trace; the wall takes a second and more with 256^3 voxels."""
+        if self.run.goes_to("simulate"):
+            self.run.kernels()
+            wall_of(self.lumen.distance, self.run.config.solver.hull)
+        _ = self.wire_in_reference
 
     def part(self, number: int, earlier: Earlier[_Part]) -> _Part:
         """Trace one frame; it has failed where its scan cannot be read."""
