@@ -102,7 +102,7 @@ def segment(
     return Lumen(
         reorder(found.distance, axes), wall.levels.half, said,
         {**region.counters, **wall.counters, "touching_places": float(len(open_ones))},
-        {"noise": region.levels.noise, "wall_noise_mm": wall.noise_mm, "blur_mm": wall.blur_mm,
+        {"noise": region.levels.noise, "wall_noise_mm": wall.noise_mm(region.taps), "blur_mm": wall.blur_mm,
          "scanner_blur_mm": blur, "least_filling": found.least},
         known_with_place(volume),
     )  # fmt: skip

@@ -73,7 +73,7 @@ def lumen_from_labels(labels: Volume, config: SegmentConfig) -> Lumen:
     grid, axes = in_memory_order(labels)
     order = np.flatnonzero(grid.values.reshape(-1) >= 0.5)
     site = prepare(grid, order, LABEL_TAPS, config.margin_mm)
-    values = signed_distance(site, GreyLevels(1.0, 0.0, 0.0), config.outer_mm).values
+    values = signed_distance(site, GreyLevels(1.0, 0.0, 0.0, (0.0,)), config.outer_mm).values
     distance = reorder(site.grid.with_values(values), axes)
     return _lumen(distance, "the lumen is the given label map, its staircase smoothed")
 

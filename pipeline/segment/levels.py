@@ -11,9 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import ndimage
 from scipy.special import chndtr
 
-from pipeline.arrays.grids import spread, unflattened
+from pipeline.arrays.grids import unflattened
 from pipeline.model import Counters
 from pipeline.segment._kernels.voxels import rebased
+from pipeline.segment.noise import noise_left, smoothed, voxel_noise
 from pipeline.status import FrameStatus, StageError
 from solver.grid import Grid
 
@@ -35,8 +36,9 @@ Index = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class GreyLevels:
-    """Grey values of the object and of what surrounds it, and the noise of one voxel before smoothing.
+    """Grey values of the object and of what surrounds it, and the noise.
 
+    noise : of one voxel beside the next.  noise_left : its standard deviation by how often 1-2-1 has smoothed it.
     seed, at_seed : the voxel around which they were first estimated, and ``inside`` as it was there.
     brightest, foreign : the grey above which a voxel is no vessel, and the share of the deepest voxels that are
     brighter; set only where that is more than BRIGHT_SHARE.
@@ -45,6 +47,7 @@ class GreyLevels:
     inside: float
     outside: float
     noise: float
+    noise_left: tuple[float, ...]
     seed: tuple[int, ...] | None = None
     at_seed: float = float("nan")
     brightest: float = float("inf")
@@ -59,6 +62,10 @@ class GreyLevels:
     def half(self) -> float:
         """The level of the wall."""
         return 0.5 * (self.inside + self.outside)
+
+    def noise_after(self, taps: NDArray[Any]) -> float:
+        """Standard deviation of the noise in grey smoothed by binomial taps; from twice on as after twice."""
+        return self.noise_left[min(len(taps) // 2, len(self.noise_left) - 1)]
 
 
 def box_around(grid: Grid, index: NDArray[Any], half_mm: float, least: int) -> tuple[slice, slice, slice]:
@@ -95,25 +102,11 @@ def _two_levels(grey: NDArray[Any], seed: float, at: tuple[int, ...]) -> tuple[f
     return inside, outside, region
 
 
-def _noise(rough: NDArray[Any], region: NDArray[np.bool_]) -> float:
-    """Spread of grey minus smoothed grey well inside the region, or well outside if that is too thin."""
-    core = ndimage.binary_erosion(region, iterations=2)
-    if core.sum() < 100:
-        core = ~ndimage.binary_dilation(region, iterations=4)
-    values = rough[core] if core.any() else rough.ravel()
-    return spread(values) / 0.935
-
-
 def levels_at(grid: Grid, index: NDArray[Any]) -> tuple[GreyLevels, NDArray[np.int64]]:
-    """GreyLevels around one seed voxel, and the voxel (3,) to start at: that of median smoothed grey among its 3^3.
-
-    Noise is the spread of (grey - grey smoothed by 1-2-1) inside, which white noise of sd 1 leaves at 0.935.
-    """
+    """GreyLevels around one seed voxel, and the voxel (3,) to start at: that of median smoothed grey among its 3^3."""
     box = box_around(grid, index, BOX_MM, LEAST_BOX)
     raw = np.asarray(grid.values[box], np.float32)
-    grey = raw
-    for axis in range(3):
-        grey = ndimage.convolve1d(grey, [0.25, 0.5, 0.25], axis=axis, mode="nearest")
+    grey = smoothed(raw)
     start = np.array([s.start for s in box])
     # a seed may be half a voxel off, and a wire may lie on it: the median of 3^3 voxels is the lumen's still
     near = box_around(grid, index, 0.0, 1)
@@ -123,9 +116,9 @@ def levels_at(grid: Grid, index: NDArray[Any]) -> tuple[GreyLevels, NDArray[np.i
     best = np.unravel_index(int(np.argmin(np.abs(around - seed))), around.shape)
     at = tuple(int(b) + s.start for b, s in zip(best, inner, strict=True))
     inside, outside, region = _two_levels(grey, seed, at)
-    noise = _noise(raw - grey, region)
     found = start + np.array(at)
-    return GreyLevels(inside, outside, noise, tuple(found.tolist()), inside), found
+    noise, left = voxel_noise(raw - grey, region), noise_left(raw, region)
+    return GreyLevels(inside, outside, noise, left, tuple(found.tolist()), inside), found
 
 
 def scanner_blur(blur_mm: float, taps: NDArray[Any], voxel: float) -> float:

@@ -33,9 +33,6 @@ THIN_TOLERANCE = 0.004
 """The same where no vessel is thick: there level, curvature and blur depend on each other."""
 SURFACE_ROUNDS = 3
 """Surfaces at most beyond the first: only a vessel as thin as its blur, whose plateau is not seen, needs them."""
-NOISE_LEFT = 0.29
-"""Share of a voxel's noise that moves the wall, after smoothing: with 0.6 to 0.2 mm voxels, noise of 0.03 to 0.21 of
-the contrast, the wall is off by 0.06 to 0.22 voxels (standard deviation), of which 0.07 is not due to noise."""
 PLACES = 30_000
 """Places on the wall, or so, at which its filling is looked at."""
 
@@ -166,11 +163,10 @@ class SignedDistance:
     wall: tuple[Array, Array]
     least: float = 1.0
 
-    @property
-    def noise_mm(self) -> float:
-        """Standard deviation (mm) of the wall's place by noise: NOISE_LEFT of the noise over the wall's steepness."""
+    def noise_mm(self, taps: NDArray[np.float32]) -> float:
+        """Standard deviation (mm) of the wall's place by noise: what is left of it over the wall's steepness."""
         levels = self.levels
-        return float(NOISE_LEFT * levels.noise * np.sqrt(2 * np.pi) * self.blur_mm / levels.contrast)
+        return float(levels.noise_after(taps) * np.sqrt(2 * np.pi) * self.blur_mm / levels.contrast)
 
 
 def signed_distance(site: Site, levels: GreyLevels, outer_mm: float, filled: Filled | None = None) -> SignedDistance:

@@ -22,7 +22,7 @@ from pipeline.segment._kernels.crests import crests
 from pipeline.segment._kernels.solids import cones
 from pipeline.segment._kernels.voxels import largest, rebased
 from pipeline.segment._kernels.wall import PAD, dilate
-from pipeline.segment.connect import connect, neighbours, noise_after
+from pipeline.segment.connect import connect, neighbours
 from pipeline.segment.contact import numbered, parts
 from pipeline.segment.levels import GreyLevels, Index
 from pipeline.segment.surface import into_box, padded_box
@@ -30,8 +30,9 @@ from solver.grid import Array, Grid
 
 FAINTEST = 0.09
 """Least share of the contrast at which branches are followed: at a lower one, other tissue would be followed, too."""
-SIGMAS = 5.0
-"""The same in standard deviations of the smoothed noise: 30 of a hundred million voxels are above by chance."""
+SIGMAS = 4.5
+"""The same in standard deviations of the smoothed noise: of a hundred million voxels 300 are above by chance, hardly ever
+several side by side."""
 SKIRT = 3
 """Layers around the voxels at FULL that the vessel's own blur may fill: from 0.65 to 0.09 it falls in two voxels."""
 SHORTEST = 6
@@ -76,7 +77,7 @@ Balls = tuple[Array, Array]
 
 def _low_affinity(levels: GreyLevels, affinity: Affinity) -> Affinity | None:
     """Tables that link any two voxels whose mean is above the faintest grey; None where noise leaves no room."""
-    least = max(FAINTEST, SIGMAS * levels.noise * noise_after(affinity.taps) / levels.contrast)
+    least = max(FAINTEST, SIGMAS * levels.noise_after(affinity.taps) / levels.contrast)
     if least > 0.4:
         return None
     mean = affinity.low + 0.5 / affinity.scale * np.arange(len(affinity.feature))

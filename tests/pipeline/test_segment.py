@@ -79,15 +79,23 @@ def test_a_vessel_whose_grey_is_cut_off_is_told(noise, darkest, spot):
     assert any("one and the same grey" in text for text in cut.warnings) is (noise > 0)
 
 
-@pytest.mark.parametrize("noise", [80.0, 200.0])
-def test_how_far_noise_moves_the_wall_is_said(noise):
-    """Noise that is correlated as a scanner's: white noise moves the wall half as far."""
-    curve, origin, clean = tube(2.0)
-    rough = gaussian_filter(np.random.default_rng(1).standard_normal(clean.shape), 0.5)
+@pytest.mark.parametrize("radius", [0.6, 2.0])
+@pytest.mark.parametrize("noise", [60.0, 150.0])
+@pytest.mark.parametrize("correlation", [0.0, 0.5, 0.8, 1.5])
+def test_how_far_noise_moves_the_wall_is_said(radius, noise, correlation):
+    """The wider noise is correlated, the more of it smoothing leaves: 0.07 voxel were said of 0.3, 0.01 of 0.17.
+
+    It is no vessel either: of noise that is correlated over 0.8 voxel and more a fifth of the lumen were branches.
+    """
+    curve, origin, clean = tube(radius)
+    rough = np.random.default_rng(1).standard_normal(clean.shape)
+    rough = gaussian_filter(rough, correlation) if correlation else rough
     grey = phantoms.scan(clean, 0.8, 0.0, seed=1) + noise * rough / rough.std()
     lumen = segment(Volume(grey, [VOXEL] * 3, origin), curve[[200]])
-    low, high = np.percentile(wall_error(lumen, curve, 2.0), [16, 84])  # a speck of noise beside the tube is no wall
-    assert lumen.levels["wall_noise_mm"] / VOXEL == pytest.approx(0.5 * (high - low), rel=0.35)
+    error = wall_error(lumen, curve, radius)
+    low, high = np.percentile(error, [16, 84])
+    assert lumen.levels["wall_noise_mm"] / VOXEL == pytest.approx(0.5 * (high - low), rel=0.4)
+    assert np.mean(error < -2.0) < 2e-3
 
 
 def test_memory_order_and_pose_do_not_change_the_lumen():

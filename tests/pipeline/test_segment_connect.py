@@ -27,7 +27,7 @@ from pipeline.segment.levels import GreyLevels
 from solver.grid import Grid
 from tests.naive import connectedness as naive
 
-LEVELS = GreyLevels(inside=800.0, outside=100.0, noise=60.0)
+LEVELS = GreyLevels(inside=800.0, outside=100.0, noise=60.0, noise_left=(60.0, 14.0))
 
 
 def strength_map(grid, seeds, affinity, threshold, offsets):

@@ -14,7 +14,7 @@ from tests.studies.seeing.table import look
 
 @pytest.mark.parametrize("share", [0.6, 0.8, 1.0, 1.6])
 def test_the_level_lies_where_a_blurred_wall_passes_it(share: float) -> None:
-    low, levels = 0.6, GreyLevels(inside=1000.0, outside=100.0, noise=1.0)
+    low, levels = 0.6, GreyLevels(inside=1000.0, outside=100.0, noise=1.0, noise_left=(1.0,))
     filled = Filled(cKDTree(np.zeros((1, 3))), np.array([share]), low, low)
     (blurs,), (steepness,) = filled.at(np.zeros((1, 3)))
     grey = 100.0 + 900.0 * share * ndtr(blurs)

@@ -14,7 +14,7 @@ from pipeline.segment.connect import connect, estimate_affinity, neighbours, str
 from pipeline.segment.levels import GreyLevels
 from solver.grid import Grid
 
-LEVELS = GreyLevels(1000.0, 100.0, 50.0)
+LEVELS = GreyLevels(1000.0, 100.0, 50.0, (50.0, 12.0))
 ROUNDS = 4
 """Rounds of all methods in turn, so that a busy machine hits each; the best of each counts."""
 

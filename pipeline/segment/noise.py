@@ -1,0 +1,61 @@
+"""The noise of a scan around a vessel: of one voxel beside the next, and what smoothing leaves of it.
+
+Noise of a scanner is correlated: the second is more than white noise of the first would leave. Scales are told apart
+by the wavelet planes of the algorithm "a trous" (Starck and Murtagh, Astronomical Image and Data Analysis, 2006).
+"""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from pipeline.arrays.grids import spread
+
+SHARP = 0.935
+"""Spread of grey less smoothed grey, of white noise of 1."""
+PLANES = 0.914, 0.867, 0.781
+"""Share that the two planes hold of white noise, smoothed by 1-2-1 not at all, once and twice. Of noise correlated over
+0.5, 0.8 and 1.5 voxels (Gaussian) it is 4, 11 and 28 per cent less, once smoothed: by so much it is understated."""
+CLEAR = 7
+"""Voxels that the second and third plane reach: so far from the vessel's edge it does not count."""
+LEAST = 100
+
+
+def smoothed(grey: NDArray[Any], step: int = 1) -> NDArray[Any]:
+    """Grey smoothed by 1-2-1 along each axis, over neighbours ``step`` voxels away."""
+    taps = np.zeros(2 * step + 1)
+    taps[[0, step, -1]] = 0.25, 0.5, 0.25
+    for axis in range(3):
+        grey = ndimage.convolve1d(grey, taps, axis=axis, mode="nearest")
+    return grey
+
+
+def voxel_noise(rough: NDArray[Any], region: NDArray[np.bool_]) -> float:
+    """Spread of ``rough`` (grey less smoothed grey) well inside the region, or well outside if that is too thin.
+
+    In units of the white noise that would leave as much.
+    """
+    core = ndimage.binary_erosion(region, iterations=2)
+    if core.sum() < LEAST:
+        core = ~ndimage.binary_dilation(region, iterations=4)
+    return spread(rough[core] if core.any() else rough.ravel()) / SHARP
+
+
+def noise_left(grey: NDArray[Any], region: NDArray[np.bool_]) -> tuple[float, ...]:
+    """Standard deviation of the noise around the region, in ``grey`` smoothed by 1-2-1 not at all, once and twice.
+
+    What is wider than ten voxels or so is tissue, not noise.
+    """
+    outside = ~ndimage.binary_dilation(region, iterations=CLEAR)
+    if np.count_nonzero(outside) < LEAST:
+        outside = ndimage.binary_erosion(region, iterations=CLEAR)
+    if np.count_nonzero(outside) < LEAST:
+        outside = ~region
+    left = []
+    for share in PLANES:
+        second = smoothed(grey, 2)
+        third = smoothed(second, 4)
+        left.append(float(np.hypot(spread((grey - second)[outside]), spread((second - third)[outside]))) / share)
+        grey = smoothed(grey)
+    return tuple(left)
