@@ -31,8 +31,8 @@ from solver.grid import Array, Grid
 FAINTEST = 0.09
 """Least share of the contrast at which branches are followed: at a lower one, other tissue would be followed, too."""
 SIGMAS = 4.5
-"""The same in standard deviations of the smoothed noise: of a hundred million voxels 300 are above by chance, hardly ever
-several side by side."""
+"""The same in standard deviations of the smoothed noise: of a hundred million voxels 300 are above by chance, hardly
+ever several side by side."""
 SKIRT = 3
 """Layers around the voxels at FULL that the vessel's own blur may fill: from 0.65 to 0.09 it falls in two voxels."""
 SHORTEST = 6
