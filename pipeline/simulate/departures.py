@@ -4,12 +4,19 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pipeline.arrays.polyline import angle_deg
-from pipeline.model import Clamp, Curve
+from pipeline.arrays.polyline import angle_deg, at_arc
+from pipeline.model import Array, Clamp, Curve, arc_length
 from pipeline.simulate.evidence import UNKNOWN_VOXELS
 
 FAR_OFF = 3.0
 """Standard deviations beyond which a statement is called contradicted: chance alone goes there once in a hundred."""
+
+FIRST_MM = np.array([0.5, 3.5])
+"""Where the chord begins and ends that shows a wire's direction at the clamp."""
+LEAST_MM = 10.0
+"""Length from which a curved tip lies beyond it."""
+TURNED_DEG = 3.0
+"""Angle between chords that is worth a word: a trace's error of 0.03 mm turns one by 0.6 degrees, frame by frame."""
 
 
 def departed(given: Clamp, found: Clamp, sigma_mm: float, sigma_deg: float) -> str:
@@ -55,3 +62,29 @@ def beside(curves: Sequence[Curve], given: Clamp, sigma_mm: float, voxel_mm: flo
         f"{sigma_mm:.3g} and a trace's own error allow; the wire is simulated from the manifest's entry all the same: "
         "check entry_mm, or let the clamp be estimated (entry_sigma_mm above 0 and simulate.entry = traced)"
     )
+
+
+def turned(wires: Sequence[Array], curves: Sequence[Array]) -> str:
+    """A warning where traced wires leave an entry, whose direction is taken as stated, in another one than simulated.
+
+    wires, curves : simulated and traced wires (n, 3) of the same frames.
+    """
+    both = [(w, c) for w, c in zip(wires, curves, strict=True) if min(arc_length(w)[-1], arc_length(c)[-1]) > LEAST_MM]
+    if not both:
+        return ""
+    simulated, traced = (np.median([_chord(line) for line in lines], axis=0) for lines in zip(*both, strict=True))
+    off = angle_deg(traced, simulated)
+    if not off > TURNED_DEG:
+        return ""
+    frames = f"{len(both)} frame{'s' * (len(both) != 1)}"
+    return (
+        f"in their first {FIRST_MM[1]:g} mm the traced wires point {off:.0f} degrees away from the simulated ones "
+        f"(median of {frames}), which leave in entry_direction as stated: check it, or let the clamp be estimated "
+        "(entry_direction_sigma_deg above 0 and simulate.entry = traced)"
+    )
+
+
+def _chord(line: Array) -> Array:
+    """The direction (3,) of a wire at the clamp."""
+    first, last = at_arc(line, FIRST_MM)
+    return np.asarray((last - first) / np.linalg.norm(last - first))

@@ -102,7 +102,14 @@ def test_the_row_over_all_rests_on_the_insertions(out: Path) -> None:
             "catheter = {bending_stiffness_N_mm2 = 60, radius_mm = 0.6, insertion_mm = [5, 15, 25, 35]}\nwire = ",
             "catheter",
         ),
-        ("entry_mm", "entry_mm", ""),
+        ("[8.0, 0.12], ", "[8.0, 0.36], ", "0.5 times its tip's curve"),
+        ("[8.0, 0.12], ", "[8.0, 0.04], ", "2 times its tip's curve"),
+        (
+            "entry_direction = ",
+            "entry_direction_sigma_deg = 0\nentry_direction = [0.14, 0.0, 0.99] #",
+            "degrees away from the simulated",
+        ),
+        ("entry_direction = ", "entry_direction_sigma_deg = 0\nentry_direction = ", ""),
     ],
 )
 def test_the_scans_speak_against_what_is_stated_wrongly(

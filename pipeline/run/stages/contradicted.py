@@ -13,7 +13,8 @@ from pipeline.compare.config import CompareConfig
 from pipeline.compare.metrics import point_to_curve, scored
 from pipeline.model import Array
 from pipeline.run.stages.known import Context, Frame, Known
-from pipeline.run.stages.rivals import CATHETER, ROLL, TIP_CURVE, Way, Wires, simulated_frames
+from pipeline.run.stages.rivals import BENT, CATHETER, ROLL, TIP_CURVE, Way, Wires, simulated_frames
+from pipeline.simulate.departures import turned
 
 FAR_NEARER = 0.7
 """Share of its rms distance below which a wire that is simulated otherwise speaks against what is stated: half the mean
@@ -31,6 +32,9 @@ def contradicted(run: Context, known: Known, ways: Sequence[Way], wires: Sequenc
     if run.case.simulated is not None:
         return []
     frames, config = simulated_frames(known), run.config.compare
+    elsewhere = _leave_elsewhere(known)
+    if elsewhere:
+        return [elsewhere]
     stated = [_squares(f, None if f.solved is None else f.solved.joints_mm, config) for f in frames]
     otherwise = [[_squares(f, wire, config) for f, wire in zip(frames, own, strict=True)] for own in wires]
     whole = _nearest(ways, stated, otherwise, FAR_NEARER)
@@ -44,6 +48,15 @@ def contradicted(run: Context, known: Known, ways: Sequence[Way], wires: Sequenc
         for frame, one in zip(frames, alone, strict=True)
         if one and one[1] > LEAST_MM and not frame.uncertain
     ]
+
+
+def _leave_elsewhere(known: Known) -> str:
+    """What ``turned`` says of a clamp whose direction was not estimated."""
+    if known.clamp is None or known.clamp.sigma_deg > 0.0:
+        return ""
+    frames = [f for f in simulated_frames(known) if f.ok and f.solved is not None and f.trusted_curve is not None]
+    curves = [curve.points_mm for f in frames if (curve := f.trusted_curve) is not None]
+    return turned([f.solved.joints_mm for f in frames if f.solved is not None], curves)
 
 
 Squares = tuple[float, int]
@@ -80,6 +93,10 @@ def _nearest(
 def _said(where: str, other_mm: float, stated_mm: float, way: Way) -> str:
     """The warning, with what to look at."""
     how, do = {
+        BENT: (
+            f"with {way.bent:g} times its tip's curve",
+            "rest_curvature_per_mm (per mm) and, where that is right, roll_deg and the wall's friction",
+        ),
         TIP_CURVE: ("straight at rest", "rest_curvature_per_mm and roll_deg"),
         ROLL: (
             f"turned by {(way.turn_deg + 179.0) % 360.0 - 179.0:+g} degrees",

@@ -29,11 +29,15 @@ def simulated_frames(known: Known) -> list[Frame]:
 
 
 class Way(NamedTuple):
-    """What a wire is simulated with that is not as stated; every roll is turned by ``turn_deg``."""
+    """What a wire is simulated with that is not as stated.
+
+    turn_deg : by which every roll is turned.  bent : times the stated curve of the tip.
+    """
 
     without: str
     config: SimulateConfig
     turn_deg: float = 0.0
+    bent: float = 1.0
 
     @property
     def catheter(self) -> bool:
@@ -41,11 +45,13 @@ class Way(NamedTuple):
         return self.without != CATHETER
 
 
-TIP_CURVE, ROLL, CATHETER = "no_tip_curve", "roll_unknown", "no_catheter"
+TIP_CURVE, ROLL, CATHETER, BENT = "no_tip_curve", "roll_unknown", "no_catheter", "tip_otherwise_bent"
+TIMES = 0.5, 2.0, 5.0
+"""The curve of the tip, over the stated one, that may speak against it."""
 
 
 def rival_ways(run: Context, known: Known) -> list[Way]:
-    """How the rivals are simulated: without the tip's curve, ROLLS turned ones, without the catheter.
+    """How the rivals are simulated: with a straight tip, ROLLS turned ones, bent TIMES as much, without a catheter.
 
     Empty where they are switched off or nothing was simulated. A wire that is straight at rest has no curve to leave
     out or to turn: both would be the simulated wire again, which no simulator beats.
@@ -56,6 +62,8 @@ def rival_ways(run: Context, known: Known) -> list[Way]:
     if run.case.wire.curved:
         ways = [Way(TIP_CURVE, replace(plain, rest_curvature_scale=0.0))]
         ways += [Way(ROLL, plain, 360.0 * i / ROLLS) for i in range(ROLLS)]
+        stated = plain.rest_curvature_scale
+        ways += [Way(BENT, replace(plain, rest_curvature_scale=times * stated), bent=times) for times in TIMES]
     return ways + [Way(CATHETER, plain)] * any(frame.catheter_mm > 0.0 for frame in simulated_frames(known))
 
 
