@@ -7,7 +7,7 @@ import signal
 import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from typing import NoReturn
 
@@ -15,14 +15,13 @@ import shtab
 
 from pipeline import one_thread
 from pipeline.commands import VERBS, complain, unwritable
+from pipeline.commands.summaries import remove_summaries
 from pipeline.status import InputError, StageError, did_you_mean
 from pipeline.streams import lasting
 from reports.atomic import WriteError
 
 OK, FAILED, BAD_INPUT = 0, 1, 2
 COMMAND_LINE = "the command line"
-SUMMARIES = ("junit", "json", "markdown", "html")
-"""Options that name a file which tells a build server, or a reader, what became of the command."""
 
 
 class Terminated(KeyboardInterrupt):
@@ -116,29 +115,12 @@ def carried_out(args: argparse.Namespace) -> int:
     First the summaries of an earlier command go: one that is refused would leave them, all passed. Then it checks that
     every place to write is writable, so that no result is computed that cannot be saved.
     """
-    _remove_summaries(args)
+    problems = remove_summaries(args)
     places = ((getattr(args, name, None), option) for name, option in (("out", "-o"), ("junit", "--junit")))
-    problems = [text for place, option in places if place is not None for text in unwritable(Path(place), option)]
+    problems += [text for place, option in places if place is not None for text in unwritable(Path(place), option)]
     if problems:
         raise _usage(problems[0])
     return int(importlib.import_module(f"pipeline.commands.{args.command}").main(args))
-
-
-def _remove_summaries(args: argparse.Namespace) -> None:
-    """Remove the regular files that the command would write anew; InputError for one that it reads."""
-    if getattr(args, "dry_run", False):
-        return
-    given = {name: value for name, value in vars(args).items() if isinstance(value, (Path, list))}
-    found = {name: Path(str(given[name])) for name in SUMMARIES if name in given}
-    others = [value for name, value in given.items() if name not in found]
-    read = [Path(one) for value in others for one in (value if isinstance(value, list) else [value])]
-    for name, path in found.items():
-        if path.is_symlink() or not path.is_file():
-            continue
-        if any(one.exists() and path.samefile(one) for place in read for one in (place, place / "manifest.toml")):
-            raise _usage(f"--{name} {path}: the command reads this file; name another one")
-        with suppress(OSError):  # said below, where it is tried whether the place is writable
-            path.unlink()
 
 
 @contextmanager

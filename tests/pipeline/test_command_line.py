@@ -340,29 +340,48 @@ def test_each_gate_is_a_test(study: Path, tmp_path: Path, capsys: pytest.Capture
     assert "gate closed" in str(suite[0][0].get("message"))
 
 
+SUMMARIES = {
+    "junit": "<?xml version='1.0' encoding='utf-8'?>\n<testsuites name=\"wireval diff\"></testsuites>",
+    "json": '{\n "schema": 1,\n "closed": false,\n',
+    "markdown": "**no worse**\n\nfirst: `a`, second: `b`\n",
+    "html": "<!doctype html>\n<title>Two runs beside each other - wireval</title>",
+}
+
+
 def test_a_refused_command_leaves_no_summary_of_an_earlier_one(
     study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """A build server read the file of the run before, in which all had passed."""
-    old = [tmp_path / f"old.{name}" for name in ("xml", "json", "md", "html")]
-    for path in old:
-        path.write_text("passed", encoding="utf-8")
-    assert main(["run", str(tmp_path / "none"), "-o", str(tmp_path / "out"), "--junit", str(old[0])]) == 2
-    assert not old[0].exists()
-    old[0].touch()
-    names = ("junit", "json", "markdown", "html")
-    asked = [word for name, path in zip(names, old, strict=True) for word in (f"--{name}", str(path))]
+    old = {name: tmp_path / f"old.{name}" for name in SUMMARIES}
+    for name, path in old.items():
+        path.write_text(SUMMARIES[name], encoding="utf-8")
+    assert main(["run", str(tmp_path / "none"), "-o", str(tmp_path / "out"), "--junit", str(old["junit"])]) == 2
+    assert not old["junit"].exists()
+    old["junit"].touch()
+    asked = [word for name, path in old.items() for word in (f"--{name}", str(path))]
     assert main(["diff", str(tmp_path / "a"), str(tmp_path / "b"), *asked]) == 2
-    assert not any(path.exists() for path in old)
+    assert not any(path.exists() for path in old.values())
 
 
-def test_what_a_command_reads_is_no_summary(study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    manifest, kept = study / "manifest.toml", tmp_path / "junit.xml"
-    for given in (study, manifest):
-        assert main(["run", str(given), "-o", str(tmp_path / "out"), "--junit", str(manifest)]) == 2
-        assert "the command reads this file" in capsys.readouterr().err
-    assert manifest.is_file()
-    kept.touch()
+@pytest.mark.parametrize("name", SUMMARIES)
+def test_what_is_no_summary_is_not_replaced_by_one(
+    name: str, study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A scan, a result or a device was removed for one, and the command then missed it."""
+    scan, pipe, long = tmp_path / "reference.mha", tmp_path / "pipe", tmp_path / ("n" * 300)
+    scan.write_bytes(b"ObjectType = Image\n")
+    os.mkfifo(pipe)
+    words = ["run", str(study), "-o", str(tmp_path / "out")] if name == "junit" else ["diff", str(study), str(study)]
+    for path, said in ((scan, "no earlier summary"), (pipe, "a device or a pipe"), (long, "name another file")):
+        assert main([*words, f"--{name}", str(path)]) == 2
+        assert said in capsys.readouterr().err
+    assert scan.read_bytes() == b"ObjectType = Image\n"
+    assert pipe.is_fifo()
+
+
+def test_a_dry_run_leaves_a_summary(study: Path, tmp_path: Path) -> None:
+    kept = tmp_path / "junit.xml"
+    kept.write_text(SUMMARIES["junit"], encoding="utf-8")
     assert main(["run", str(study), "-o", str(tmp_path / "out"), "--junit", str(kept), "--dry-run"]) == 0
     assert kept.exists(), "a dry run does nothing"
 
