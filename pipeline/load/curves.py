@@ -134,7 +134,8 @@ def read_truth(path: Path, frame_count: int | None) -> list[Array]:
     if len(curves) != frame_count or any(c.ndim != 2 or c.shape[1] != 3 for c in curves):
         raise unusable(path, f"holds {len(curves)} curves, expected {frame_count} of shape (n, 3), one per frame")
     for number, curve in enumerate(curves):
-        if len(curve) < 2:
-            raise unusable(path, f"frame {number} holds {len(curve)} points; expected two or more")
+        apart = 1 + int(np.count_nonzero(np.any(np.diff(curve, axis=0) != 0, axis=1))) if len(curve) else 0
+        if apart < 2:
+            raise unusable(path, f"frame {number} holds {apart} points; expected two or more, apart from each other")
         reachable(path, curve, f"frame {number}: points")
     return curves

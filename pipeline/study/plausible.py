@@ -6,7 +6,9 @@ from operator import attrgetter
 import numpy as np
 
 from pipeline.load import Header, read_header
-from pipeline.model import Wire
+from pipeline.load.curves import read_truth
+from pipeline.model import Array, Wire, arc_length
+from pipeline.simulate.others import oddity
 from pipeline.study.manifest import Case
 from pipeline.study.same_scans import shared
 from pipeline.study.settings import Config
@@ -103,6 +105,32 @@ def odd_depths(case: Case, header: Header | None) -> list[str]:
     return [f"insertion_mm goes to {deepest:g} mm, {than}: is it in another unit than mm?"]
 
 
+TRUTH_OFF_MM, TRUTH_OFF = 5.0, 0.25
+"""How much longer or shorter than insertion_mm a true wire may be, mm and as a share: the larger counts."""
+
+
+def odd_truth(case: Case, curves: Sequence[Array]) -> list[str]:
+    """A sentence where true wires (n, 3) cannot be those of their frames."""
+    entry, direction = np.array(case.entry_mm), np.array(case.entry_direction)
+    said = [oddity(points, entry, direction) for points in curves]
+    if case.insertion_mm and not any(said):
+        lengths = [float(arc_length(points)[-1]) for points in curves]
+        said = [
+            f"it is {length:.1f} mm long, insertion_mm states {mm:g}; are the frames in order?"
+            if abs(length - mm) > max(TRUTH_OFF_MM, TRUTH_OFF * mm)
+            else ""
+            for length, mm in zip(lengths, case.insertion_mm, strict=True)
+        ]
+    wrong = [(number, text) for number, text in enumerate(said) if text]
+    if not wrong:
+        return []
+    number, text = wrong[0]
+    more = f" ({len(wrong)} of {len(said)} frames)" if len(wrong) > 1 else ""
+    return [
+        f"the true wire of frame {number} cannot be its wire: {text}{more}; the columns of the truth say nothing then"
+    ]
+
+
 HALF_A_TURN_DEG = 180.0
 
 
@@ -135,7 +163,8 @@ def doubts(cases: Sequence[Case], config: Config) -> Iterator[str]:
     yield from implausible(cases)
     for case in cases:
         scan = first_of(case, config)
-        said = (*leads_out(case, scan), *odd_depths(case, scan), *wrapped_rolls(case))
+        said = [*leads_out(case, scan), *odd_depths(case, scan), *wrapped_rolls(case)]
+        said += odd_truth(case, read_truth(case.truth, None)) if case.truth else []
         yield from (f"case {case.id!r}: {text}" for text in said)
     yield from shared(cases)
 

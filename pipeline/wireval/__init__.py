@@ -123,7 +123,10 @@ def calibrate(manifest: Place, out: Place, **more: bool | Settings) -> Path:
 def _carried_out(verb: str, manifest: Place, settings: object = None, **options: object) -> None:
     """The verb as typed with these options. A list repeats its option, True stands for one alone."""
     words = [verb, str(manifest)]
-    for key, wanted in (settings if isinstance(settings, Mapping) else {}).items():
+    if settings is not None and not isinstance(settings, Mapping):
+        expected = 'a mapping, {"segment.threshold": 0.5}, with the keys that --set takes'
+        raise InputError([f"settings: got {settings!r}; expected {expected}"])
+    for key, wanted in (settings or {}).items():
         words += ["--set", f"{key}={json.dumps(wanted)}"]
     for name, value in options.items():
         for one in value if isinstance(value, (list, tuple)) else [value]:

@@ -9,6 +9,7 @@ from typing import NoReturn
 import pandas as pd
 
 from pipeline.run.gate import gate
+from pipeline.run.results import found_results
 from pipeline.status import InputError, did_you_mean
 from reports import tables
 from reports.case_files import CaseFiles, amiss, find_cases, not_run, read_case
@@ -33,7 +34,8 @@ class Results:
     summary : a row a case.     overall : one row over all validation cases, with intervals.     errors : a row a frame,
     of all cases.     failures : what is not ok, and why.     sweep : a row for each value of a sweep.
     cases : each case's folder, read: ``results.cases["run1"].read_frame(3).simulated_mm``.     closed : a sentence for
-    each ``fail_if`` of the run that holds.
+    each ``fail_if`` of the run that holds.     damaged : cases whose files are not as they were written; their errors
+    and points are left out.
     """
 
     out: Path
@@ -44,20 +46,28 @@ class Results:
     sweep: pd.DataFrame
     cases: Cases
     closed: tuple[str, ...] = ()
+    damaged: tuple[str, ...] = ()
 
     @property
     def ok(self) -> bool:
         """Whether every case that was to be run is here, whole, all its frames ok, with the same settings; and no gate
         closed.
         """
-        if self.closed or not len(self.summary) or len(self.failures) or not_run(self.out) or mixed_settings(self.out):
+        if (
+            self.closed
+            or self.damaged
+            or not len(self.summary)
+            or len(self.failures)
+            or not_run(self.out)
+            or mixed_settings(self.out)
+        ):
             return False
         return not any(amiss(case.folder) for case in self.cases.values())
 
     @property
     def points(self) -> pd.DataFrame:
         """Every compared point of all cases; read when asked for, since it is by far the largest table."""
-        return _of_all({name: case.points for name, case in self.cases.items()}, POINTS)
+        return _of_all({n: case.points for n, case in self.cases.items() if n not in self.damaged}, POINTS)
 
     def __repr__(self) -> str:
         """What a prompt shows: where it lies, the counts, a row a case, no more than ten."""
@@ -73,14 +83,20 @@ class Results:
 
 
 def read_results(out: str | Path) -> Results:
-    """Read the folder that ``wireval run`` wrote; raises InputError where it is none."""
+    """Read the folder that ``wireval run`` wrote; raises InputError where it is none.
+
+    Warns of cases whose files are not as they were written.
+    """
     out = Path(out)
     if not out.is_dir():
         raise InputError([f"{out}: no such folder; give one that `wireval run` wrote"])
+    damaged = {one.case: one.failures[0]["message"] for one in found_results(out) if one.status == "damaged"}
+    for message in damaged.values():
+        warnings.warn(f"{message}; its errors are left out", stacklevel=2)
     cases = {folder.name: read_case(folder, points=False) for folder in find_cases(out)}
     if not cases:
         raise InputError([f"{out}: no cases below it; give a folder that `wireval run` wrote"])
-    return _results(out, cases)
+    return _results(out, cases, tuple(damaged))
 
 
 def read_run(out: Path, gates: Sequence[str] = ()) -> Results:
@@ -94,7 +110,7 @@ def read_run(out: Path, gates: Sequence[str] = ()) -> Results:
     return replace(found, closed=tuple(filter(None, (gate(text).closed(pooled) for text in gates))))
 
 
-def _results(out: Path, cases: dict[str, CaseFiles]) -> Results:
+def _results(out: Path, cases: dict[str, CaseFiles], damaged: tuple[str, ...] = ()) -> Results:
     def table(kind: Table, name: str = "") -> pd.DataFrame:
         return tables.read_if_there(out / (name or kind.file), kind)
 
@@ -102,8 +118,8 @@ def _results(out: Path, cases: dict[str, CaseFiles]) -> Results:
         again = f"run its command again, or `wireval report {out}`"
         warnings.warn(f"{out}: the run into it has not ended, tables over all cases are empty; {again}", stacklevel=3)
     whole = table(SUMMARY, OVERALL_FILE)
-    errors = _of_all({name: case.errors for name, case in cases.items()}, ERRORS)
-    return Results(out, table(SUMMARY), whole, errors, table(FAILURES), table(SWEEP), Cases(cases))
+    errors = _of_all({name: case.errors for name, case in cases.items() if name not in damaged}, ERRORS)
+    return Results(out, table(SUMMARY), whole, errors, table(FAILURES), table(SWEEP), Cases(cases), damaged=damaged)
 
 
 def _of_all(by_case: dict[str, pd.DataFrame], kind: Table) -> pd.DataFrame:

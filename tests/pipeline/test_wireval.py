@@ -62,6 +62,11 @@ def test_a_run_gives_frames(study: Path, tmp_path: Path) -> None:
     assert len(repr(results).splitlines()) < 13
     assert len(repr(results)) < 1000
     assert wireval.read_results(tmp_path / "out").errors.equals(results.errors)
+    table = tmp_path / "out" / "cases" / "straight" / "errors.csv"
+    table.write_text(table.read_text(encoding="utf-8").replace("0.1", "0.01"), encoding="utf-8")
+    with pytest.warns(UserWarning, match="errors.csv is not as it was written"):
+        altered = wireval.read_results(tmp_path / "out")
+    assert (altered.ok, altered.damaged, len(altered.errors), len(altered.points)) == (False, ("straight",), 0, 0)
     again = wireval.run(study, tmp_path / "out", fail_if=["rms_mm>0.001", "rms_mm>9"], resume=True, **kept)
     assert not again.ok, "a closed gate was seen on the terminal alone"
     assert len(again.closed) == 1
@@ -93,6 +98,7 @@ def test_verbs_are_called_as_they_are_typed(monkeypatch: pytest.MonkeyPatch, tmp
 def test_what_cannot_be_used_is_raised(study: Path, tmp_path: Path) -> None:
     with pytest.raises(wireval.InputError, match="no such case"):
         wireval.run(study, tmp_path / "out", only=["none"])
+    assert "expected a mapping" in wireval.check(study, settings=["segment.threshold=-1"])[0]  # type: ignore[arg-type]
     with pytest.raises(wireval.InputError, match="did you mean '--fresh'"):
         wireval.run(study, tmp_path / "out", fesh=True)
     with pytest.raises(wireval.InputError, match="wireval run"):

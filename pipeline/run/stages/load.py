@@ -10,7 +10,7 @@ from pipeline.load.geometry import LoadError
 from pipeline.load.views import read_views
 from pipeline.run.stages.known import Context, Frame, Known
 from pipeline.study.manifest import Case, not_one_per_frame
-from pipeline.study.plausible import implausible, leads_out, measured_otherwise, odd_depths
+from pipeline.study.plausible import implausible, leads_out, measured_otherwise, odd_depths, odd_truth
 
 
 def open_case(run: Context, known: Known) -> Known:
@@ -39,6 +39,7 @@ def open_case(run: Context, known: Known) -> Known:
         frames = [replace(f, view=view) for f, view in zip(frames, views, strict=True)]
     if case.truth:
         truth = read_truth(case.truth, count)
+        run.log.warnings += odd_truth(case, truth)
         frames = [replace(f, truth_mm=points) for f, points in zip(frames, truth, strict=True)]
     return replace(known, scans=scans, frames=tuple(frames))
 
