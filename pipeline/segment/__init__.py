@@ -1,6 +1,8 @@
 """segment: scan -> lumen. A method finds the vessel's voxels, its grey values say where the wall lies."""
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,6 +16,7 @@ from pipeline.segment.config import SegmentConfig
 from pipeline.segment.contact import contacts, warning
 from pipeline.segment.cut_off import cut_off
 from pipeline.segment.fuzzy import fuzzy_region
+from pipeline.segment.layered import Layer, layer_around
 from pipeline.segment.levels import Region, brighter, scanner_blur
 from pipeline.segment.necks import add_necks, closed_necks
 from pipeline.segment.on_wire import beside, swallowed
@@ -33,7 +36,7 @@ METHOD = fuzzy_region
 class _Found:
     """The vessel found from seeds: the grid with its contrast evened out, its region, and its wall on the site's box.
 
-    least : lowest share of the contrast along the vessel.  blur : the scanner's, mm.
+    least : lowest share of the contrast along the vessel.  blur : the scanner's, mm.  layer : what lies around it.
     """
 
     grid: Grid
@@ -42,6 +45,7 @@ class _Found:
     site: Site
     wall: SignedDistance
     blur: float
+    layer: Layer | None = None
 
     @property
     def distance(self) -> Grid:
@@ -50,8 +54,21 @@ class _Found:
 
 
 def _found(grid: Grid, seeds_mm: ArrayLike, config: SegmentConfig, wire: bool) -> _Found:
-    region = METHOD(grid, seeds_mm, config)
-    shown, region, least = evened(grid, region, lambda filled: METHOD(filled, seeds_mm, config))
+    """The vessel; where it lies in a layer, the one that is found with nothing darker than that."""
+    found = _as_shown(grid, seeds_mm, config, wire, METHOD)
+    layer = layer_around(grid, found.distance, found.site.corner)
+    if layer is None:
+        return found
+    shown = layer.shown(grid, found.distance, found.site.corner)
+    method = partial(METHOD, noise_left=found.region.levels.noise_left)
+    return replace(_as_shown(shown, seeds_mm, config, wire, method), layer=layer)
+
+
+def _as_shown(
+    grid: Grid, seeds_mm: ArrayLike, config: SegmentConfig, wire: bool, method: Callable[..., Region]
+) -> _Found:
+    region = method(grid, seeds_mm, config)
+    shown, region, least = evened(grid, region, lambda filled: method(filled, seeds_mm, config))
     site = prepare(shown, region.voxels, region.taps, config.margin_mm, region.thin)
     wall = wall_of(site, region.levels, config.outer_mm, wire)
     blur = scanner_blur(wall.blur_mm, region.taps, float(np.min(grid.spacing_mm)))
@@ -94,7 +111,8 @@ def segment(
         thin = balls(grid, region.thin, site.corner, region.levels, blur)
         add_balls(wall.values, np.asarray(grid.spacing_mm), thin, config.outer_mm)
     other = brighter(wall.levels) + bright + uneven.warning(found.least)
-    said = cut_off(scan, found.distance, site.corner) + warning(open_ones)
+    said: tuple[str, ...] = () if found.layer is None else (found.layer.said(float(np.mean(grid.spacing_mm))),)
+    said += cut_off(scan, found.distance, site.corner) + warning(open_ones)
     said += other or bone.two_greys(grid, found.distance, site.corner, wall.levels, wall.blur_mm)
     box = wall.values, site.corner
     said += add_necks(region.necks, box, grid, region.levels, blur)

@@ -117,8 +117,8 @@ def levels_at(grid: Grid, index: NDArray[Any]) -> tuple[GreyLevels, NDArray[np.i
     at = tuple(int(b) + s.start for b, s in zip(best, inner, strict=True))
     inside, outside, region = _two_levels(grey, seed, at)
     found = start + np.array(at)
-    noise, left = voxel_noise(raw - grey, region), noise_left(raw, region)
-    return GreyLevels(inside, outside, noise, left, tuple(found.tolist()), inside), found
+    noise = voxel_noise(raw - grey, region)
+    return GreyLevels(inside, outside, noise, noise_left(raw, region, noise), tuple(found.tolist()), inside), found
 
 
 def scanner_blur(blur_mm: float, taps: NDArray[Any], voxel: float) -> float:

@@ -10,6 +10,7 @@ from scipy.special import ndtr
 
 from pipeline.arrays.grids import spread
 from pipeline.model import Array, Lumen, Volume
+from pipeline.segment.layered import layer_in
 
 NEAR_VOXELS = 3.0
 """The most by which a wall is moved; voxels are looked at up to twice as far outside the given one."""
@@ -35,6 +36,9 @@ def beside_the_wall(lumen: Lumen, scan: Volume) -> list[str]:
     if np.count_nonzero(seen) < LEAST_POINTS:
         return []
     grey = ndimage.map_coordinates(scan.values, index[seen].T, order=1, output=np.float64)
+    layer = layer_in(distance[seen] / voxel, grey)
+    if layer is not None:  # what is darker than the phantom's wall tells nothing of the vessel's
+        grey = np.maximum(grey, layer.floor)
     found = _offset(grey, normals[seen], distance[seen] / voxel)
     if found is None:
         return []

@@ -1,0 +1,63 @@
+"""Vessels of silicone in air or water: the lumen ends where the silicone begins, not where it ends."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pipeline.model import Lumen, Volume
+from pipeline.segment import segment
+from pipeline.segment.shown import beside_the_wall
+from solver.grid import Grid
+from tests.pipeline import phantoms
+from tests.pipeline.test_segment import VOXEL, wall_error
+
+RADIUS = 1.6
+
+
+def phantom(greys, thick_mm, noise=25.0, seed=1):
+    """A curved tube of contrast medium in a wall: its scan, its axis and the true distance. greys : from inside out."""
+    curve = phantoms.helix(8.0, 14.0, 0.7)
+    origin = curve.min(axis=0) - RADIUS - 5.0
+    shape = tuple(np.ceil((curve.max(axis=0) + RADIUS + 5.0 - origin) / VOXEL).astype(int))
+    distance = phantoms.distance_to(curve, shape, VOXEL, origin, RADIUS + 5.0) - RADIUS
+    vessel, layer, beyond = greys
+    clean = beyond + (layer - beyond) * phantoms.partial_volume(distance - thick_mm, VOXEL)
+    clean += (vessel - layer) * phantoms.partial_volume(distance, VOXEL)
+    return Volume(phantoms.scan(clean, 0.7, noise, seed), [VOXEL] * 3, origin), curve, distance
+
+
+@pytest.mark.parametrize(
+    ("greys", "thick_mm"),
+    [
+        ((300.0, 100.0, -1000.0), 1.0), ((400.0, 150.0, -1000.0), 0.6), ((1000.0, 150.0, -1000.0), 0.4),
+        ((400.0, 150.0, -1000.0), 2.0), ((400.0, 200.0, 0.0), 1.0), ((400.0, 150.0, 0.0), 0.6),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("noise", [25.0, 60.0])
+def test_the_lumen_ends_where_the_silicone_begins(greys, thick_mm, noise):
+    """The wall was 0.24 to 1.9 mm too far out, and nothing said so."""
+    scan, curve, _ = phantom(greys, thick_mm, noise)
+    lumen = segment(scan, curve[[200]])
+    off = wall_error(lumen, curve, RADIUS)
+    assert abs(np.median(off)) < 0.25
+    assert np.percentile(np.abs(off), 95) < 0.75
+    assert any("a layer of grey" in warning for warning in lumen.warnings)
+
+
+@pytest.mark.parametrize(("greys", "thick_mm"), [((400.0, 150.0, -1000.0), 9.0), ((900.0, 100.0, 98.0), 1.0)])
+def test_a_block_of_silicone_is_no_layer(greys, thick_mm):
+    scan, curve, _ = phantom(greys, thick_mm)
+    lumen = segment(scan, curve[[200]])
+    assert abs(np.median(wall_error(lumen, curve, RADIUS))) < 0.1
+    assert not any("a layer of grey" in warning for warning in lumen.warnings)
+
+
+@pytest.mark.parametrize(("larger_mm", "said"), [(0.0, ""), (0.6, "outside the wall that the scan shows")])
+def test_the_outside_of_the_silicone_is_no_lumen(larger_mm, said):
+    """It was the other way round: the right one was called 0.5 mm too small."""
+    scan, _, distance = phantom((400.0, 150.0, -1000.0), 0.6)
+    lumen = Lumen(Grid((np.minimum(distance, 5.0) - larger_mm).astype(np.float32), [VOXEL] * 3, scan.origin_mm), 0.0)
+    found = beside_the_wall(lumen, scan)
+    assert bool(found) == bool(said)
+    assert all(said in text for text in found)
