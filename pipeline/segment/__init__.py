@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pipeline.arrays.cores import side_by_side
+from pipeline.arrays.edges import Layer
 from pipeline.arrays.fingerprint import known_with_place
 from pipeline.arrays.grids import in_memory_order, reorder
 from pipeline.model import Lumen, Volume
@@ -16,7 +17,7 @@ from pipeline.segment.config import SegmentConfig
 from pipeline.segment.contact import contacts, warning
 from pipeline.segment.cut_off import cut_off
 from pipeline.segment.fuzzy import fuzzy_region
-from pipeline.segment.layered import Layer, layer_around
+from pipeline.segment.layered import layer_around, surrounded, with_layer_alone
 from pipeline.segment.levels import Region, brighter, scanner_blur
 from pipeline.segment.necks import add_necks, closed_necks
 from pipeline.segment.on_wire import beside, swallowed
@@ -56,12 +57,15 @@ class _Found:
 def _found(grid: Grid, seeds_mm: ArrayLike, config: SegmentConfig, wire: bool) -> _Found:
     """The vessel; where it lies in a layer, the one that is found with nothing darker than that."""
     found = _as_shown(grid, seeds_mm, config, wire, METHOD)
-    layer = layer_around(grid, found.distance, found.site.corner)
+    layer = layer_around(grid, found.distance, found.site.corner, found.region.levels.seed)
     if layer is None:
         return found
-    shown = layer.shown(grid, found.distance, found.site.corner)
+    shown = with_layer_alone(layer, grid, found.distance, found.site.corner)
     method = partial(METHOD, noise_left=found.region.levels.noise_left)
-    return replace(_as_shown(shown, seeds_mm, config, wire, method), layer=layer)
+    try:
+        return replace(_as_shown(shown, seeds_mm, config, wire, method), layer=layer)
+    except StageError:  # no vessel is left within it: it was none
+        return found
 
 
 def _as_shown(
@@ -111,7 +115,7 @@ def segment(
         thin = balls(grid, region.thin, site.corner, region.levels, blur)
         add_balls(wall.values, np.asarray(grid.spacing_mm), thin, config.outer_mm)
     other = brighter(wall.levels) + bright + uneven.warning(found.least)
-    said: tuple[str, ...] = () if found.layer is None else (found.layer.said(float(np.mean(grid.spacing_mm))),)
+    said: tuple[str, ...] = () if found.layer is None else (surrounded(found.layer, float(np.mean(grid.spacing_mm))),)
     said += cut_off(scan, found.distance, site.corner) + warning(open_ones)
     said += other or bone.two_greys(grid, found.distance, site.corner, wall.levels, wall.blur_mm)
     box = wall.values, site.corner
@@ -121,6 +125,7 @@ def segment(
         reorder(found.distance, axes), wall.levels.half, said,
         {**region.counters, **wall.counters, "touching_places": float(len(open_ones))},
         {"noise": region.levels.noise, "wall_noise_mm": wall.noise_mm(region.taps), "blur_mm": wall.blur_mm,
-         "scanner_blur_mm": blur, "least_filling": found.least},
+         "scanner_blur_mm": blur, "least_filling": found.least}
+        | ({} if found.layer is None else {"layer": found.layer.grey}),
         known_with_place(volume),
     )  # fmt: skip

@@ -8,9 +8,9 @@ import numpy as np
 from scipy import ndimage
 from scipy.special import ndtr
 
+from pipeline.arrays.edges import layer_in
 from pipeline.arrays.grids import spread
 from pipeline.model import Array, Lumen, Volume
-from pipeline.segment.layered import layer_in
 
 NEAR_VOXELS = 3.0
 """The most by which a wall is moved; voxels are looked at up to twice as far outside the given one."""

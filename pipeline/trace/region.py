@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
+from pipeline.arrays.edges import layer_in
 from pipeline.arrays.grids import contiguous, corners_mm, integer_offset, reorder, sampled, spread
 from pipeline.arrays.lattice import sparse_zeros
 from pipeline.arrays.spare import Spare
@@ -122,8 +123,14 @@ def wall_blur(lumen: Lumen, voxel: float) -> float:
     return found if np.isfinite(found) and found > 0.3 * voxel else 0.9 * voxel
 
 
-def _wall_model(scan: Grid, corner: NDArray[np.int64], region: SearchRegion, lumen: Lumen) -> WallModel:
-    """Grey over signed distance: the medians well inside and 2 to 4 voxels outside, joined by a blurred step."""
+def _wall_model(
+    scan: Grid, corner: NDArray[np.int64], region: SearchRegion, lumen: Lumen, *, empty: bool = False
+) -> WallModel:
+    """Grey over signed distance: the medians well inside and 2 to 4 voxels outside, joined by a blurred step.
+
+    In a wall of silicone it is two steps: with one, its outer edge counted as noise, 100 grey where it was 25. empty :
+    whether the scan shows no wire.
+    """
     voxel = float(np.min(scan.spacing_mm))
     at = region.sample
     grey, distance = scan.values[tuple((at + corner).T)], region.box.values[tuple(at.T)]
@@ -131,7 +138,13 @@ def _wall_model(scan: Grid, corner: NDArray[np.int64], region: SearchRegion, lum
     inside = float(np.median(grey[deep if deep.any() else distance < 0]))
     outside = float(np.median(grey[out])) if out.any() else inside
     steps = np.arange(-TABLE_HALF, TABLE_HALF + 1) * TABLE_STEP * voxel
-    table = outside + (inside - outside) * ndtr(-steps / wall_blur(lumen, voxel))
+    # `segment` has looked; of a lumen that the user brings nobody knows, and a wire may pass for the vessel's core
+    asked = "layer" in lumen.levels or (empty and not lumen.levels)
+    layer = layer_in(distance / voxel, grey) if asked else None
+    if layer is None:
+        table = outside + (inside - outside) * ndtr(-steps / wall_blur(lumen, voxel))
+    else:
+        table = layer.at(steps / voxel)
     return WallModel(region.box.values, region.runs, table, TABLE_STEP * voxel)
 
 
@@ -150,7 +163,7 @@ Background = tuple[NDArray[Any], NDArray[Any] | None]
 
 def _smoothed(reference: Volume, region: SearchRegion, lumen: Lumen, axes: tuple[int, int, int]) -> Background:
     scan, corner = _on_box(reference, region, axes)
-    wall = _wall_model(scan, corner, region, lumen)
+    wall = _wall_model(scan, corner, region, lumen, empty=True)
     kind = np.int16 if scan.values.dtype.kind in "iu" and scan.values.dtype.itemsize <= 2 else np.float32
     rough, out = sparse_zeros(region.box.shape, kind), sparse_zeros(region.box.shape, kind)
     model = sparse_zeros(region.box.shape, np.float64)
