@@ -18,6 +18,7 @@ from pipeline.commands import VERBS, complain, unwritable
 from pipeline.status import InputError, StageError, did_you_mean
 from pipeline.streams import lasting
 from reports.atomic import WriteError
+from reports.texts import UnreadableError
 
 OK, FAILED, BAD_INPUT = 0, 1, 2
 COMMAND_LINE = "the command line"
@@ -183,7 +184,7 @@ def _main(argv: Sequence[str] | None) -> int:
             return BAD_INPUT
         with _ended_by_signal():
             return carried_out(args)
-    except (InputError, StageError) as error:
+    except (InputError, StageError, UnreadableError) as error:
         told = error if isinstance(error, InputError) else InputError([str(error)])
         then = "" if getattr(args, "command", "") == "check" else f"; {told.then}"  # check never runs anything
         return complain(told.problems, told.place or str(getattr(args, "manifest", COMMAND_LINE)), then)

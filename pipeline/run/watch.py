@@ -20,7 +20,8 @@ from rich.table import Column
 from pipeline.run.case import Job
 from pipeline.run.ledger import RESULT
 from pipeline.run.log import STAGES
-from reports.case_files import GOOD, counted, read_json
+from reports.case_files import GOOD, counted
+from reports.records import read_json
 
 EVERY_S = 0.3
 STEP = re.compile(rf"\] ({'|'.join(STAGES)}) (\d+)/(\d+)  ")

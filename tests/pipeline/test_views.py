@@ -237,7 +237,7 @@ def test_projections_that_are_none_are_refused(known: Known, tmp_path: Path) -> 
         with pytest.raises(LoadError, match=said):
             read_views(file, 4)
     file.write_text("{", encoding="utf-8")
-    with pytest.raises(LoadError, match="cannot be read as projections"):
+    with pytest.raises(LoadError, match="no JSON; expected"):
         read_views(file, 4)
 
 
