@@ -18,7 +18,7 @@ from pipeline.commands import VERBS, complain, unwritable
 from pipeline.status import InputError, StageError, did_you_mean
 from pipeline.streams import lasting
 from reports.atomic import WriteError
-from reports.texts import UnreadableError
+from reports.texts import UnreadableError, status_of
 
 OK, FAILED, BAD_INPUT = 0, 1, 2
 COMMAND_LINE = "the command line"
@@ -117,6 +117,10 @@ def carried_out(args: argparse.Namespace) -> int:
     First the summaries of an earlier command go: one that is refused would leave them, all passed. Then it checks that
     every place to write is writable, so that no result is computed that cannot be saved.
     """
+    for value in vars(args).values():
+        for path in value if isinstance(value, list) else [value]:
+            if isinstance(path, Path):
+                status_of(path)  # a name that cannot be one is refused here, whatever it was to be
     _remove_summaries(args)
     places = ((getattr(args, name, None), option) for name, option in (("out", "-o"), ("junit", "--junit")))
     problems = [text for place, option in places if place is not None for text in unwritable(Path(place), option)]

@@ -28,7 +28,10 @@ def read_json(path: Path) -> dict[str, Any]:
     """
     if not path.exists():
         return {}
-    content = texts.read_json(path, WRITTEN, AGAIN)
+    try:
+        content = texts.read_json(path, WRITTEN)
+    except texts.UnreadableError as error:  # nobody shall correct or copy it, as the sentence ends
+        raise texts.UnreadableError(f"{str(error).rpartition('; ')[0]}; {AGAIN}") from None
     if not isinstance(content, dict):
         raise texts.unreadable(path, f"no table of keys and values; expected {WRITTEN}; {AGAIN}")
     known = {key: value for key, value in content.items() if value is not None}

@@ -99,10 +99,10 @@ def read_text(path: Path, most: int = TEXT_BYTES) -> str:
         raise unreadable(path, why) from None
 
 
-def read_json(path: Path, what: str, do: str = "write it again") -> Any:
-    """The content of a JSON file. what : it should be, in words.     do : what is to be done where it is not."""
+def read_json(path: Path, what: str) -> Any:
+    """The content of a JSON file. what : it should be, in words."""
     text = read_text(path)
-    return _parsed(path, lambda: json.loads(text), lambda _: f"{path}: no JSON; expected {what}; {do}")
+    return _parsed(path, lambda: json.loads(text), lambda _: f"{path}: no JSON; expected {what}; write it again")
 
 
 def read_toml(path: Path) -> dict[str, Any]:

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 from pipeline.commands import add_quiet, complain, say
 from pipeline.status import did_you_mean
+from reports.atomic import writing
+from reports.texts import size_of, status_of
 
 HELP = "write a synthetic study with truth, as real files"
 MOST_FRICTION = 1.0
@@ -74,8 +76,10 @@ def _problems(args: Namespace) -> list[str]:
     if args.friction is not None and not 0.0 <= args.friction <= MOST_FRICTION:
         return [f"--friction {args.friction:g}: expected 0 to {MOST_FRICTION:g}; hydrophilic wires have 0.01 to 0.1"]
     for path in (args.anatomy, args.background):
-        if path is not None and not path.exists():
+        if path is not None and status_of(path) is None:
             return [f"{path}: no such file"]
+        if path is not None and not (path == args.background and path.is_dir()):  # of DICOM slices
+            size_of(path)
     return [] if args.out is not None else ["-o DIR is missing: where shall the study be written?"]
 
 
@@ -115,6 +119,8 @@ def main(args: Namespace) -> int:
         study = catalogue.build(scene, scanner=args.scanner, **numbers)
     except (ValueError, ImportError) as error:
         return complain([str(error)], "the command line")
+    except MemoryError:
+        return complain(["the scans do not fit into memory; give a smaller --size"], "the command line")
     if args.background is not None:
         say(f"{study.name}: {scene.why}")
     quality = study.quality
@@ -126,7 +132,8 @@ def main(args: Namespace) -> int:
     earlier = len(earlier_files(args.out))
     if earlier:
         chat(f"{args.out}: an earlier study is replaced: its {earlier} files are removed")
-    manifest = write_study(study, args.out, format=args.format, progress=None if args.quiet else _progress)
+    with writing(args.out):
+        manifest = write_study(study, args.out, format=args.format, progress=None if args.quiet else _progress)
     say(f"{study.name}: written in {perf_counter() - clock:.0f} s.  manifest: {manifest}")
     return 0
 
@@ -169,7 +176,8 @@ def _share(args: Namespace, numbers: range) -> dict[int, str]:
 
     plan, written = catalogue.prepare(_scene(args), catalogue.SCANNERS[args.scanner], _wanted(args)), {}
     for number in numbers:
-        written[number] = write_one_of(catalogue.insertion_into(plan, number), args.out, number + 1, args.format)
+        with writing(args.out / str(number + 1)):
+            written[number] = write_one_of(catalogue.insertion_into(plan, number), args.out, number + 1, args.format)
         if not args.quiet:
             sys.stderr.write(f"insertion {number + 1}/{args.insertions}\n")
     return written

@@ -12,7 +12,7 @@ from typing import Any, Literal, TextIO
 import numpy as np
 
 from pipeline.model import Counters, Levels
-from reports.atomic import writing
+from reports.atomic import write_text, writing
 
 Stage = Literal["load", "segment", "trace", "simulate", "compare", "report"]
 STAGES: tuple[Stage, ...] = ("load", "segment", "trace", "simulate", "compare", "report")
@@ -134,8 +134,7 @@ class CaseProgress:
 
     def start(self) -> None:
         """Empty the log file."""
-        with writing(self.log):
-            self.log.write_text("", encoding="utf-8")
+        write_text(self.log, "")  # in place of whatever stands there, as a pipe, on which nobody would read
 
     def __call__(self, stage: str, done: int, total: int, text: str) -> None:
         """One step of a stage is finished."""

@@ -77,7 +77,10 @@ def read_results(out: str | Path) -> Results:
     out = Path(out)
     if not out.is_dir():
         raise InputError([f"{out}: no such folder; give one that `wireval run` wrote"])
-    cases = {folder.name: read_case(folder, points=False) for folder in find_cases(out)}
+    try:
+        cases = {folder.name: read_case(folder, points=False) for folder in find_cases(out)}
+    except ValueError as error:
+        raise InputError([str(error)]) from None
     if not cases:
         raise InputError([f"{out}: no cases below it; give a folder that `wireval run` wrote"])
     return _results(out, cases)
