@@ -60,9 +60,8 @@ def _read_swc(path: Path) -> Tree:
         )
     place = {int(i): k for k, i in enumerate(rows[:, 0])}
     points, radii = rows[:, 2:5], rows[:, 5]
-    edges = np.array([(k, place[int(p)]) for k, p in enumerate(rows[:, 6]) if int(p) in place], dtype=np.int64).reshape(
-        -1, 2
-    )
+    joined = [(k, place[int(p)]) for k, p in enumerate(rows[:, 6]) if int(p) in place]
+    edges = np.array(joined, dtype=np.int64).reshape(-1, 2)
     length = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1)
     # points that coincide (BraVa repeats branch points) become one of the larger radius, else edges have no length
     unique, inverse = np.unique(points.round(6), axis=0, return_inverse=True)

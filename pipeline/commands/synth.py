@@ -12,7 +12,7 @@ from reports.atomic import writing
 from reports.texts import size_of, status_of
 
 HELP = "write a synthetic study with truth, as real files"
-MOST_FRICTION = 1.0
+MOST_FRICTION, MOST_INSERTIONS = 1.0, 1000
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -71,6 +71,8 @@ def _problems(args: Namespace) -> list[str]:
         return [f"no scene {args.name!r}; {did_you_mean(args.name, catalogue.names())}"]
     if args.insertions < 1 or args.jobs < 1:
         return [f"--insertions {args.insertions} -j {args.jobs}: expected 1 or more"]
+    if args.insertions > MOST_INSERTIONS:
+        return [f"--insertions: expected 1 to {MOST_INSERTIONS}"]
     if args.name is None and args.scanner != "psf":
         return [f"--scanner {args.scanner}: only the catalogue's scenes can be scanned so; leave it out"]
     if args.friction is not None and not 0.0 <= args.friction <= MOST_FRICTION:
@@ -97,7 +99,6 @@ def _scene(args: Namespace) -> "NamedScene":
 def main(args: Namespace) -> int:
     """Exit 0 when the study is written, 2 on wrong input."""
     from data_synthetic import catalogue
-    from data_synthetic.write import earlier_files, in_the_way, write_study
 
     if args.list:
         for name in catalogue.names():
@@ -106,21 +107,28 @@ def main(args: Namespace) -> int:
     problems = _problems(args)
     if problems:
         return complain(problems, "the command line")
-    if args.insertions > 1:
-        return _several(args)
+    try:
+        return _one(args) if args.insertions == 1 else _several(args)
+    except MemoryError:
+        return complain(["the scans do not fit into memory; give a smaller --size"], "the command line")
+
+
+def _one(args: Namespace) -> int:
+    """One study; as ``main``."""
+    from data_synthetic import catalogue
+    from data_synthetic.write import earlier_files, in_the_way, write_study
+
     clock = perf_counter()
     numbers = {"frames": args.frames, "size": args.size, "voxel_mm": args.voxel_mm, "seed": args.seed}
     try:
         scene = _scene(args)
         problems = catalogue.Wanted(**numbers).problems(scene, args.scanner)
-        problems += in_the_way(args.out, args.format, args.frames or scene.frames)
+        problems = problems or in_the_way(args.out, args.format, args.frames or scene.frames)
         if problems:
             return complain(problems, "the command line")
         study = catalogue.build(scene, scanner=args.scanner, **numbers)
     except (ValueError, ImportError) as error:
         return complain([str(error)], "the command line")
-    except MemoryError:
-        return complain(["the scans do not fit into memory; give a smaller --size"], "the command line")
     if args.background is not None:
         say(f"{study.name}: {scene.why}")
     quality = study.quality
@@ -150,7 +158,8 @@ def _several(args: Namespace) -> int:
         scene = _scene(args)
         frames = args.frames or scene.frames
         problems = _wanted(args).problems(scene, args.scanner) + alone(args.out)
-        problems += [p for n in range(args.insertions) for p in in_the_way(args.out / str(n + 1), args.format, frames)]
+        folders = [] if problems else [args.out / str(n + 1) for n in range(args.insertions)]
+        problems += [problem for folder in folders for problem in in_the_way(folder, args.format, frames)]
     except ValueError as error:
         problems = [str(error)]
     if problems:

@@ -82,7 +82,7 @@ def scans(study: Path, tmp_path: Path) -> Path:
         ("run STUDY -o y -c STUDY", "this is a folder"),
         ("run STUDY -o y -c STUDY/none.toml", "none.toml: no such file; wireval settings prints one"),
         ("synth straight -o y --format foo", "--format 'foo': allowed: 'mha', 'nrrd'"),
-        ("bench -o y --stress --scenes -1", "--scenes -1: expected 1 or more"),
+        ("bench -o y --stress --scenes -1", "--scenes -1: expected 1 to 1000000"),
         ("bench -o y --snaps --seed -1", "--seed -1: expected 0 or more"),
         ("bench STUDY -o y --stress", "leave the manifest out"),
         ("cache", "missing: one of --info, --check, --limit, --prune"),
