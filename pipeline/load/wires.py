@@ -96,9 +96,8 @@ def _in_hdf5(path: Path, count: int, space: str, unit: str) -> list[OtherFile]:
             groups = {int(name): group for name, group in file["frames"].items()}
             points = {n: np.array(g["simulated_mm"], float) for n, g in groups.items() if "simulated_mm" in g}
     except (OSError, KeyError, ValueError, AttributeError, TypeError, RuntimeError) as error:
-        raise refused(
-            path, "no HDF5 file, or one of another layout", "/frames/NNN/simulated_mm (n, 3), NNN from 0", "write it so"
-        ) from error
+        what, allowed = "no HDF5 file, or one of another layout", "/frames/NNN/simulated_mm (n, 3), NNN from 0"
+        raise refused(path, what, allowed, "write it so") from error
     beyond = sorted(n for n in groups if not 0 <= n < count)
     if beyond:
         raise unusable(path, f"got frame {beyond[0]} for {count} frames; number them from 0 to {count - 1}")

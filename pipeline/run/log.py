@@ -109,10 +109,9 @@ def _spread(levels: dict[str, list[float]]) -> dict[str, dict[str, float]]:
 
 def last_stage(log: Path) -> str:
     """The last stage that a case's log names; empty where it names none."""
-    try:
-        lines = log.read_text(encoding="utf-8", errors="replace").splitlines()
-    except OSError:
+    if not log.is_file():
         return ""
+    lines = log.read_text(encoding="utf-8", errors="replace").splitlines()
     words = (line.partition("] ")[2].partition(" ")[0] for line in reversed(lines))
     return next((word for word in words if word in STAGES), "")
 

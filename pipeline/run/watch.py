@@ -128,7 +128,7 @@ class Watch:
         """Number of jobs done, with fractions for those that are running, and the latest log text of one of these."""
         done, heard = float(len(self._finished)), ""
         for log in (job.folder / "log.txt" for job in self.jobs if job.folder not in self._finished):
-            if log.exists() and log.stat().st_mtime >= self._start:
+            if log.is_file() and log.stat().st_mtime >= self._start:
                 text = log.read_text(encoding="utf-8", errors="replace")
                 done, heard = done + share_done(text), text.rstrip().rpartition(" s  ")[2][:60]
         return done, heard
