@@ -2,13 +2,14 @@
 
 import sys
 from argparse import ArgumentParser, Namespace
+from contextlib import contextmanager
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING
 
 from pipeline.commands import add_quiet, complain, say
 from pipeline.status import did_you_mean
-from reports.atomic import writing
+from reports.atomic import WriteError
 from reports.texts import size_of, status_of
 
 HELP = "write a synthetic study with truth, as real files"
@@ -49,8 +50,20 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from data_synthetic.catalogue import Wanted
     from data_synthetic.catalogue.scene import NamedScene
+
+
+@contextmanager
+def _written(folder: Path) -> "Iterator[None]":
+    """What the system says about a study that it cannot write becomes a WriteError, which names the file."""
+    try:
+        yield
+    except OSError as error:
+        what = f"{error.filename or folder}: cannot be written: {error.strerror or error}"
+        raise WriteError(f"{what}; make room or allow writing there, then give the same command again") from error
 
 
 def _progress(done: int, total: int) -> None:
@@ -140,7 +153,7 @@ def _one(args: Namespace) -> int:
     earlier = len(earlier_files(args.out))
     if earlier:
         chat(f"{args.out}: an earlier study is replaced: its {earlier} files are removed")
-    with writing(args.out):
+    with _written(args.out):
         manifest = write_study(study, args.out, format=args.format, progress=None if args.quiet else _progress)
     say(f"{study.name}: written in {perf_counter() - clock:.0f} s.  manifest: {manifest}")
     return 0
@@ -185,7 +198,7 @@ def _share(args: Namespace, numbers: range) -> dict[int, str]:
 
     plan, written = catalogue.prepare(_scene(args), catalogue.SCANNERS[args.scanner], _wanted(args)), {}
     for number in numbers:
-        with writing(args.out / str(number + 1)):
+        with _written(args.out / str(number + 1)):
             written[number] = write_one_of(catalogue.insertion_into(plan, number), args.out, number + 1, args.format)
         if not args.quiet:
             sys.stderr.write(f"insertion {number + 1}/{args.insertions}\n")
