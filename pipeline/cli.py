@@ -19,6 +19,7 @@ from pipeline.commands.summaries import remove_summaries
 from pipeline.status import InputError, StageError, did_you_mean
 from pipeline.streams import lasting
 from reports.atomic import WriteError
+from reports.texts import UnreadableError, status_of
 
 OK, FAILED, BAD_INPUT = 0, 1, 2
 COMMAND_LINE = "the command line"
@@ -115,6 +116,10 @@ def carried_out(args: argparse.Namespace) -> int:
     First the summaries of an earlier command go: one that is refused would leave them, all passed. Then it checks that
     every place to write is writable, so that no result is computed that cannot be saved.
     """
+    for value in vars(args).values():
+        for path in value if isinstance(value, list) else [value]:
+            if isinstance(path, Path):
+                status_of(path)  # a name that cannot be one is refused here, whatever it was to be
     problems = remove_summaries(args)
     places = ((getattr(args, name, None), option) for name, option in (("out", "-o"), ("junit", "--junit")))
     problems += [text for place, option in places if place is not None for text in unwritable(Path(place), option)]
@@ -165,7 +170,7 @@ def _main(argv: Sequence[str] | None) -> int:
             return BAD_INPUT
         with _ended_by_signal():
             return carried_out(args)
-    except (InputError, StageError) as error:
+    except (InputError, StageError, UnreadableError) as error:
         told = error if isinstance(error, InputError) else InputError([str(error)])
         then = "" if getattr(args, "command", "") == "check" else f"; {told.then}"  # check never runs anything
         return complain(told.problems, told.place or str(getattr(args, "manifest", COMMAND_LINE)), then)

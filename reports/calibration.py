@@ -6,8 +6,8 @@ from typing import Any
 import pandas as pd
 
 from reports._content import NOTHING, flatten, grid, number
-from reports.case_files import read_json
 from reports.page import draw_sections, write_page
+from reports.records import read_json
 from reports.schema import Column
 
 PRIOR = (

@@ -1,6 +1,5 @@
 """The folder of one case, read: result.json, errors.csv, points.csv.gz, frames.h5. Any of them may be missing."""
 
-import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,7 +11,9 @@ from numpy.typing import NDArray
 
 from reports import frames_file, tables
 from reports.frames_file import FrameArrays, ScanCrop
+from reports.records import read_json
 from reports.schema import ERRORS, POINTS, TIMINGS
+from reports.texts import size_of
 
 GOOD = ("ok", "simulated", "roll_fitted")
 WORST = "p95_mm"
@@ -87,22 +88,6 @@ def read_case(folder: Path, points: bool = True, rest: bool = True) -> CaseFiles
     timings = tables.read_if_there(folder / TIMINGS.file if rest else None, TIMINGS)
     scan, numbers = _frames(folder / "frames.h5", rest)
     return CaseFiles(folder, read_json(folder / "result.json"), errors, samples, timings, scan, numbers)
-
-
-def read_json(path: Path) -> dict[str, Any]:
-    """Read a JSON object; an absent file is an empty one, and a key that is null says as little as one that is absent.
-
-    Raises ValueError where it is not an object.
-    """
-    if not path.exists():
-        return {}
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except ValueError as error:
-        raise ValueError(f"{path}: not JSON ({error}); remove the folder and run the case again") from error
-    if not isinstance(content, dict):
-        raise ValueError(f"{path}: got a {type(content).__name__}, expected an object; run the case again")
-    return {key: value for key, value in content.items() if value is not None}
 
 
 def warnings_of(folder: Path) -> list[str]:
@@ -263,9 +248,8 @@ def thinned(count: int, most: int) -> NDArray[np.int_]:
 def _frames(path: Path, scan: bool) -> tuple[ScanCrop | None, tuple[int, ...]]:
     if not path.exists():
         return None, ()
+    size_of(path)
     try:
         return frames_file.read_scan(path) if scan else None, frames_file.frame_numbers(path)
-    except OSError as error:
-        raise ValueError(
-            f"{path}: not a readable HDF5 file ({error}); remove the folder and run the case again"
-        ) from error
+    except (OSError, KeyError, AttributeError, TypeError, RuntimeError) as error:
+        raise ValueError(f"{path}: not a readable HDF5 file; remove the folder and run the case again") from error

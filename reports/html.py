@@ -23,7 +23,6 @@ from reports.case_files import (
     not_run,
     not_run_sentence,
     read_case,
-    read_json,
     said_by_cases,
 )
 from reports.counts import scans
@@ -31,6 +30,7 @@ from reports.figures import RunFiles, declared
 from reports.listing import listed_files, listed_view
 from reports.origin import mixed_settings
 from reports.page import Each, begun_first, draw_sections, longest, one_by_one, section, write_page
+from reports.records import read_json
 from reports.schema import ERRORS, FAILURES, OVERALL_FILE, SIMULATORS, SUMMARY, SWEEP
 from reports.sweep import silent_points
 from reports.tables import read_if_there

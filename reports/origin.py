@@ -7,7 +7,8 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from reports.case_files import listed, manifests_in, read_json, results_in
+from reports.case_files import listed, manifests_in, results_in
+from reports.records import read_json
 
 CODE = {"wireval": "wireval", "git_commit": "commit", "git_dirty": "changed files", "python": "Python"}
 ABSENT, TOLD, UNTOLD = "(none)", "stand in its results", "(not kept)"

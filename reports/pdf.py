@@ -18,7 +18,6 @@ from reports.case_files import (
     not_reached,
     not_run_sentence,
     read_case,
-    read_json,
     results_in,
     said_by_cases,
 )
@@ -27,6 +26,7 @@ from reports.figures import declared, figures_of
 from reports.html import readable_cases, run_files
 from reports.origin import mixed_settings
 from reports.pdf_page import RIGHT, WIDE, Figured, Page
+from reports.records import read_json
 from reports.schema import FAILURES, OVERALL_FILE, SUMMARY
 from reports.tables import read_if_there
 from reports.verdict import next_command, typed, unscored, verdict, worst_frames

@@ -16,6 +16,7 @@ import pandas as pd
 
 from reports.atomic import write_bytes
 from reports.schema import Column, Table
+from reports.texts import size_of
 
 Row = Mapping[str, object]
 # not their names, which pandas looks up once a column and table: half the time of reading small ones
@@ -87,6 +88,7 @@ def read(path: Path, table: Table) -> pd.DataFrame:
     # numbers are parsed as such: to take them from text, column after column, was half the time of a page of 500 cases
     kinds = {c.name: _DTYPES[c.kind] for c in table if c.kind in ("float", "integer")}
     kept: Any = {"keep_default_na": False, "na_values": [""]}
+    size_of(path)
     try:
         raw = pd.read_csv(path, dtype=defaultdict(lambda: _DTYPES["text"], kinds), **kept)
         texts = [c.name for c in table if c.kind == "text" and c.name in raw]

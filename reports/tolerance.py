@@ -1,11 +1,11 @@
 """How much a value may change between two runs before a gate closes: a TOML file, column = allowed change."""
 
 import math
-import tomllib
 from collections.abc import Iterable
 from pathlib import Path
 
 from reports.schema import ERRORS
+from reports.texts import read_toml, status_of
 
 DEFAULT_TOLERANCE = Path(__file__).parent / "baseline" / "tolerance.toml"
 RATIO = "rms_ratio"
@@ -18,9 +18,9 @@ def load_tolerance(path: Path = DEFAULT_TOLERANCE) -> dict[str, float]:
     Raises ValueError for a file without columns, or without one of an error, an unknown column, and a negative,
     infinite or absent number.
     """
-    if not path.is_file():
+    if status_of(path) is None:
         raise ValueError(f"{path}: no such file; a tolerance is a TOML file of lines such as rms_mm = 0.03")
-    table = tomllib.loads(path.read_text(encoding="utf-8"))
+    table = read_toml(path)
     if not table:
         raise ValueError(f"{path}: it names no column, so that every change would be allowed")
     ERRORS.check(table.keys() - {RATIO}, str(path))

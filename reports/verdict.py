@@ -9,7 +9,8 @@ from typing import Any
 import pandas as pd
 
 from reports._content import NOTHING, fewer_frames, interval, number, predictor_label
-from reports.case_files import WORST, counted, read_json, results_in, said_by_cases
+from reports.case_files import WORST, counted, results_in, said_by_cases
+from reports.records import read_json
 from reports.schema import SUMMARY
 
 _MANY = 5

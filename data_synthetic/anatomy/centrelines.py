@@ -34,7 +34,8 @@ def read_tree(path: str | Path) -> Tree:
     if path.name.endswith(".swc"):
         return _read_swc(path)
     if path.name.endswith(".mrk.json"):
-        curves = [_read_curve(p) for p in (path, *sorted(set(path.parent.glob("*.mrk.json")) - {path}))]
+        beside = sorted(p for p in path.parent.glob("*.mrk.json") if p != path and p.is_file())
+        curves = [_read_curve(p) for p in (path, *beside)]
         points, radii = (np.concatenate(parts) for parts in zip(*curves, strict=True))
         ends = np.cumsum([len(own) for own, _ in curves])
         starts = np.setdiff1d(np.arange(ends[-1]), ends - 1)  # where edges start: at all but a curve's last point
@@ -46,14 +47,21 @@ def read_tree(path: str | Path) -> Tree:
 
 def _read_swc(path: Path) -> Tree:
     """Columns id, type, x, y, z, radius, parent; comments start with #."""
-    rows = np.loadtxt(path, comments="#", ndmin=2)
+    try:
+        rows = np.loadtxt(path, comments="#", ndmin=2, encoding="utf-8")
+    except ValueError:
+        allowed = "lines of 7 numbers, id type x y z radius parent"
+        raise ValueError(f"anatomy: {path}: cannot be read; allowed: {allowed}; save it again") from None
+    if not np.isfinite(rows).all():
+        raise ValueError(f"anatomy: {path}: got numbers that are not finite; correct them")
     if rows.shape[1] != 7:
         raise ValueError(
             f"anatomy: {path}: got {rows.shape[1]} columns; an SWC line has 7: id type x y z radius parent"
         )
     place = {int(i): k for k, i in enumerate(rows[:, 0])}
     points, radii = rows[:, 2:5], rows[:, 5]
-    edges = np.array([(k, place[int(p)]) for k, p in enumerate(rows[:, 6]) if int(p) in place], dtype=np.int64)
+    joined = [(k, place[int(p)]) for k, p in enumerate(rows[:, 6]) if int(p) in place]
+    edges = np.array(joined, dtype=np.int64).reshape(-1, 2)
     length = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1)
     # points that coincide (BraVa repeats branch points) become one of the larger radius, else edges have no length
     unique, inverse = np.unique(points.round(6), axis=0, return_inverse=True)
@@ -67,13 +75,20 @@ def _read_swc(path: Path) -> Tree:
 
 def _read_curve(path: Path) -> tuple[Array, Array]:
     """Points (n, 3) and radii (n,) of one Slicer curve; RAS coordinates are turned into LPS."""
-    markup = json.loads(path.read_text(encoding="utf-8"))["markups"][0]
-    points = np.array([p["position"] for p in markup["controlPoints"]], dtype=np.float64)
+    try:
+        markup = json.loads(path.read_text(encoding="utf-8"))["markups"][0]
+        points = np.array([p["position"] for p in markup["controlPoints"]], dtype=np.float64).reshape(-1, 3)
+        measured = {m["name"]: m.get("controlPointValues") for m in markup.get("measurements", [])}
+        radii = np.array(measured.get("Radius") or [], dtype=np.float64)
+    except (ValueError, TypeError, KeyError, IndexError, AttributeError, OverflowError, RecursionError):
+        allowed = "a 3D Slicer markups file with the control points of a curve and their Radius; save it again"
+        raise ValueError(f"anatomy: {path}: cannot be read; allowed: {allowed}") from None
     if markup.get("coordinateSystem", "LPS") in ("RAS", 0):
         points *= [-1.0, -1.0, 1.0]
-    radii = next((m.get("controlPointValues") for m in markup.get("measurements", []) if m["name"] == "Radius"), None)
-    if radii is None or len(radii) != len(points):
+    if radii.shape != (len(points),) or not len(points):
         raise ValueError(
             f"anatomy: {path}: got no Radius measurement per control point; add one in Slicer (Extract Centerline)"
         )
-    return points, np.array(radii, dtype=np.float64)
+    if not (np.isfinite(points).all() and np.isfinite(radii).all()):
+        raise ValueError(f"anatomy: {path}: got points or radii that are not finite; correct them")
+    return points, radii

@@ -15,6 +15,11 @@ BONE_WIRES = 1.8
 the difference of two scans does not: a wire of 0.36 mm is traced with voxels of 0.65 mm, and lost from 0.75 mm on."""
 
 
+MOST = {"frames": 10_000, "size": 1500, "seed": 2**63 - 1}
+"""Largest numbers of a study. A scan of 1500 voxels along each axis takes 65 GiB of memory while it is made (20 bytes a
+voxel), as much as a large workstation has."""
+
+
 @dataclass(frozen=True)
 class Wanted:
     """The numbers of a study; those that are None are the scene's own, the voxel its field of view over ``size``."""
@@ -38,10 +43,14 @@ class Wanted:
         if scanner == "conebeam" and importlib.util.find_spec("itk") is None:
             found.append(ABSENT)
         # with a scene, _too_small tells what size it needs
-        size = self.size if scene is None else None
-        for name, value, least in (("frames", self.frames, 1), ("size", size, 1), ("seed", self.seed, 0)):
+        least_size = -math.inf if scene is not None else 1
+        for name, value, least in (("frames", self.frames, 1), ("size", self.size, least_size), ("seed", self.seed, 0)):
             if value is not None and value < least:
                 found.append(f"{name}: got {value}; allowed: {least} or more; leave it out for the default")
+            elif value is not None and value > MOST[name]:
+                memory = " (65 GiB of memory)" if name == "size" else ""
+                got = value if value < 1e20 else "a number of more than 20 digits"
+                found.append(f"{name}: got {got}; allowed: up to {MOST[name]}{memory}; give less or leave it out")
         if self.voxel_mm is not None and not 0 < self.voxel_mm < math.inf:
             found.append(f"voxel-mm: got {self.voxel_mm:g}; allowed: above 0; leave it out for the default")
         # a real scan is as large as it is

@@ -21,9 +21,9 @@ def earlier_files(folder: Path) -> list[Path]:
     Empty where there is none, and where the manifest is not, or no longer, one that we wrote.
     """
     try:
-        (case,) = tomllib.loads((folder / MANIFEST).read_text(encoding="utf-8"))["case"]
-        frames = len(json.loads((folder / TRUTH).read_text(encoding="utf-8"))["frames"])
-    except (OSError, ValueError, KeyError, TypeError):
+        (case,) = tomllib.loads(_text(folder / MANIFEST))["case"]
+        frames = len(json.loads(_text(folder / TRUTH))["frames"])
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return []
     named = {key: case.get(key) for key in ("reference", "frames", "truth")}
     format = next((f for f in FORMATS if {**manifest_names(f, frames), "truth": TRUTH} == named), None)
@@ -33,6 +33,11 @@ def earlier_files(folder: Path) -> list[Path]:
     # a DICOM series is a folder of slices: those that are numbered as we number them
     slices = [p for path in paths for p in ([path] if path.is_file() else sorted(path.glob("[0-9]" * 4 + ".dcm")))]
     return [*slices, folder / TRUTH, folder / MANIFEST]
+
+
+def _text(path: Path) -> str:
+    """A file's text; empty where it is none, as a pipe, on which nobody would write."""
+    return path.read_text(encoding="utf-8", errors="replace") if path.is_file() else ""
 
 
 def in_the_way(folder: Path, format: str, frames: int) -> list[str]:
@@ -103,7 +108,7 @@ def write_all_of_them(texts: Sequence[str], folder: Path) -> Path:
 def alone(folder: Path) -> list[str]:
     """A sentence where the folder holds another manifest than one of several insertions."""
     manifest = folder / MANIFEST
-    if not manifest.exists() or ALL_OF_THEM in manifest.read_text(encoding="utf-8"):
+    if not manifest.exists() or ALL_OF_THEM in _text(manifest):
         return []
     return [f"{manifest}: is not of several insertions; give another folder"]
 

@@ -1,5 +1,10 @@
 """Volumes on disk in the containers that scanners and their software use; arrays are indexed x, y, z."""
 
+import errno
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -33,13 +38,26 @@ def manifest_names(format: str, frames: int) -> dict[str, str | list[str]]:
 def write_volume(folder: Path, format: str, number: int, scan: NDArray[np.int16], grid: ScanGrid) -> None:
     """Write volume ``number`` of a study: 0 is the reference, which comes first, 1 the first frame."""
     name = volume_names(format, number)[number]
-    if format == "h5":
-        _write_data_set(folder / HDF5_FILE, name, scan, grid)
-    elif format == "dicom":
-        _write_slices(folder / name, to_image(scan, grid), number + 1, grid)
-    else:
-        (folder / name).parent.mkdir(exist_ok=True)
-        sitk.WriteImage(to_image(scan, grid), str(folder / name), useCompression=False)
+    with _refused_by_the_system(folder, name):
+        if format == "h5":
+            _write_data_set(folder / HDF5_FILE, name, scan, grid)
+        elif format == "dicom":
+            _write_slices(folder / name, to_image(scan, grid), number + 1, grid)
+        else:
+            (folder / name).parent.mkdir(exist_ok=True)
+            sitk.WriteImage(to_image(scan, grid), str(folder / name), useCompression=False)
+
+
+@contextmanager
+def _refused_by_the_system(folder: Path, name: str) -> Iterator[None]:
+    """What ITK, GDCM or HDF5 say in their own words of a file that they cannot write is the system's error again."""
+    try:
+        yield
+    except (RuntimeError, OSError) as error:
+        # GDCM does not say why: on a full disk no slice finds a megabyte
+        full = os.strerror(errno.ENOSPC) in str(error) or shutil.disk_usage(folder).free < 2**20
+        number = errno.ENOSPC if full else getattr(error, "errno", None) or errno.EIO
+        raise OSError(number, os.strerror(number), str(folder / name)) from error
 
 
 def to_image(scan: NDArray[Any], grid: ScanGrid) -> Any:

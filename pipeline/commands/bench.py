@@ -7,6 +7,8 @@ from pipeline.commands import complain, say
 from pipeline.commands.given import file_of
 
 HELP = "run time against error; rivals; a stress study"
+MOST_SCENES = 10**6
+"""Of a stress study, which takes weeks of a core for so many."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -83,7 +85,9 @@ def _takes(args: argparse.Namespace) -> str:
 def _wrong(args: argparse.Namespace) -> list[str]:
     """What of the command line cannot be carried out."""
     problems = [f"--seed {args.seed}: expected 0 or more"] * (args.seed < 0)
-    problems += [f"--scenes {args.scenes}: expected 1 or more, or leave it out"] * (args.scenes < 0)
+    if not 0 <= args.scenes <= MOST_SCENES:
+        shown = args.scenes if abs(args.scenes) < MOST_SCENES**2 else "of more than 12 digits"
+        problems.append(f"--scenes {shown}: expected 1 to {MOST_SCENES}, or leave it out")
     studies = [f"--{name}" for name in ("stress", "peers", "snaps", "resolution") if getattr(args, name)]
     if args.manifest is not None and studies:
         problems.append(f"{args.manifest}: {', '.join(studies)} make scenes of their own; leave the manifest out")

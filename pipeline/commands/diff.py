@@ -3,7 +3,6 @@
 import argparse
 import math
 import sys
-import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -39,7 +38,6 @@ def main(args: argparse.Namespace) -> int:
     InputError on wrong input.
     """
     from pipeline.status import UsageError
-    from pipeline.toml_words import not_toml
     from reports.case_files import find_cases
     from reports.two_runs_files import write
 
@@ -49,9 +47,6 @@ def main(args: argparse.Namespace) -> int:
         raise UsageError(problems)
     try:
         verdict = _verdict(args)
-    except tomllib.TOMLDecodeError as error:
-        text = args.tolerance.read_text(encoding="utf-8")
-        raise UsageError([not_toml(args.tolerance, text, error)]) from None
     except (ValueError, OSError) as error:
         raise UsageError([str(error)]) from None
     write(verdict, **places)
@@ -65,13 +60,14 @@ def main(args: argparse.Namespace) -> int:
 def _verdict(args: argparse.Namespace) -> Any:
     """Both folders read and compared, two scores simulator by simulator; ValueError where they cannot be."""
     import pipeline.compare.nulls  # noqa: F401 - registers metrics and predictors, whose columns may have tolerances
+    from pipeline.load.guard import is_folder
     from reports.simulators import folders_in
     from reports.tolerance import DEFAULT_TOLERANCE, load_tolerance
     from reports.two_scores import together
 
     runs = args.first, args.second
     for out in runs:
-        if not out.is_dir():
+        if not is_folder(out):
             raise ValueError(f"{out}: no such folder; give one that `wireval run` wrote")
     tolerance = load_tolerance(args.tolerance or DEFAULT_TOLERANCE)
     old, new = map(folders_in, runs)

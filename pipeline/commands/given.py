@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pipeline.commands import resolved_settings, say
+from reports.texts import status_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -21,7 +22,7 @@ Inferred = tuple[str, tuple[str, ...], tuple[str, ...]]
 
 def file_of(path: Path) -> Path:
     """The manifest in a folder that holds one; else the path itself."""
-    return path / NAME if (path / NAME).exists() else path
+    return path / NAME if status_of(path / NAME) else path
 
 
 def add_manifest(parser: argparse.ArgumentParser) -> None:

@@ -39,6 +39,7 @@ def main(args: argparse.Namespace) -> int:
     from pipeline.run.sweep import found_heads, lost_points, write_sweep
     from reports.html import render_index
     from reports.inside import misleading_links
+    from reports.records import damaged_records
 
     found = found_results(args.out)
     if not found:
@@ -48,8 +49,8 @@ def main(args: argparse.Namespace) -> int:
         hint = next(iter(above), why)
         return complain([f"{args.out}: no cases/*/result.json below it; {hint}"], str(args.out), "; nothing was drawn")
     links = misleading_links(args.out)
-    if links:
-        return complain(links, str(args.out), "; nothing was drawn")
+    if problems := links or damaged_records(args.out):
+        return complain(problems, str(args.out), "; nothing was drawn")
     heads = found_heads(args.out)
     if removed := write_sweep(args.out, heads):
         sys.stderr.write(f"{removed}\n")

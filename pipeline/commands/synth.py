@@ -2,15 +2,18 @@
 
 import sys
 from argparse import ArgumentParser, Namespace
+from contextlib import contextmanager
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING
 
 from pipeline.commands import add_quiet, complain, say
 from pipeline.status import did_you_mean
+from reports.atomic import WriteError
+from reports.texts import size_of, status_of
 
 HELP = "write a synthetic study with truth, as real files"
-MOST_FRICTION = 1.0
+MOST_FRICTION, MOST_INSERTIONS = 1.0, 1000
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -47,8 +50,20 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from data_synthetic.catalogue import Wanted
     from data_synthetic.catalogue.scene import NamedScene
+
+
+@contextmanager
+def _written(folder: Path) -> "Iterator[None]":
+    """What the system says about a study that it cannot write becomes a WriteError, which names the file."""
+    try:
+        yield
+    except OSError as error:
+        what = f"{error.filename or folder}: cannot be written: {error.strerror or error}"
+        raise WriteError(f"{what}; make room or allow writing there, then give the same command again") from error
 
 
 def _progress(done: int, total: int) -> None:
@@ -69,13 +84,17 @@ def _problems(args: Namespace) -> list[str]:
         return [f"no scene {args.name!r}; {did_you_mean(args.name, catalogue.names())}"]
     if args.insertions < 1 or args.jobs < 1:
         return [f"--insertions {args.insertions} -j {args.jobs}: expected 1 or more"]
+    if args.insertions > MOST_INSERTIONS:
+        return [f"--insertions: expected 1 to {MOST_INSERTIONS}"]
     if args.name is None and args.scanner != "psf":
         return [f"--scanner {args.scanner}: only the catalogue's scenes can be scanned so; leave it out"]
     if args.friction is not None and not 0.0 <= args.friction <= MOST_FRICTION:
         return [f"--friction {args.friction:g}: expected 0 to {MOST_FRICTION:g}; hydrophilic wires have 0.01 to 0.1"]
     for path in (args.anatomy, args.background):
-        if path is not None and not path.exists():
+        if path is not None and status_of(path) is None:
             return [f"{path}: no such file"]
+        if path is not None and not (path == args.background and path.is_dir()):  # of DICOM slices
+            size_of(path)
     return [] if args.out is not None else ["-o DIR is missing: where shall the study be written?"]
 
 
@@ -93,7 +112,6 @@ def _scene(args: Namespace) -> "NamedScene":
 def main(args: Namespace) -> int:
     """Exit 0 when the study is written, 2 on wrong input."""
     from data_synthetic import catalogue
-    from data_synthetic.write import earlier_files, in_the_way, write_study
 
     if args.list:
         for name in catalogue.names():
@@ -102,14 +120,23 @@ def main(args: Namespace) -> int:
     problems = _problems(args)
     if problems:
         return complain(problems, "the command line")
-    if args.insertions > 1:
-        return _several(args)
+    try:
+        return _one(args) if args.insertions == 1 else _several(args)
+    except MemoryError:
+        return complain(["the scans do not fit into memory; give a smaller --size"], "the command line")
+
+
+def _one(args: Namespace) -> int:
+    """One study; as ``main``."""
+    from data_synthetic import catalogue
+    from data_synthetic.write import earlier_files, in_the_way, write_study
+
     clock = perf_counter()
     numbers = {"frames": args.frames, "size": args.size, "voxel_mm": args.voxel_mm, "seed": args.seed}
     try:
         scene = _scene(args)
         problems = catalogue.Wanted(**numbers).problems(scene, args.scanner)
-        problems += in_the_way(args.out, args.format, args.frames or scene.frames)
+        problems = problems or in_the_way(args.out, args.format, args.frames or scene.frames)
         if problems:
             return complain(problems, "the command line")
         study = catalogue.build(scene, scanner=args.scanner, **numbers)
@@ -126,7 +153,8 @@ def main(args: Namespace) -> int:
     earlier = len(earlier_files(args.out))
     if earlier:
         chat(f"{args.out}: an earlier study is replaced: its {earlier} files are removed")
-    manifest = write_study(study, args.out, format=args.format, progress=None if args.quiet else _progress)
+    with _written(args.out):
+        manifest = write_study(study, args.out, format=args.format, progress=None if args.quiet else _progress)
     say(f"{study.name}: written in {perf_counter() - clock:.0f} s.  manifest: {manifest}")
     return 0
 
@@ -143,7 +171,8 @@ def _several(args: Namespace) -> int:
         scene = _scene(args)
         frames = args.frames or scene.frames
         problems = _wanted(args).problems(scene, args.scanner) + alone(args.out)
-        problems += [p for n in range(args.insertions) for p in in_the_way(args.out / str(n + 1), args.format, frames)]
+        folders = [] if problems else [args.out / str(n + 1) for n in range(args.insertions)]
+        problems += [problem for folder in folders for problem in in_the_way(folder, args.format, frames)]
     except ValueError as error:
         problems = [str(error)]
     if problems:
@@ -169,7 +198,8 @@ def _share(args: Namespace, numbers: range) -> dict[int, str]:
 
     plan, written = catalogue.prepare(_scene(args), catalogue.SCANNERS[args.scanner], _wanted(args)), {}
     for number in numbers:
-        written[number] = write_one_of(catalogue.insertion_into(plan, number), args.out, number + 1, args.format)
+        with _written(args.out / str(number + 1)):
+            written[number] = write_one_of(catalogue.insertion_into(plan, number), args.out, number + 1, args.format)
         if not args.quiet:
             sys.stderr.write(f"insertion {number + 1}/{args.insertions}\n")
     return written

@@ -5,48 +5,48 @@ A FIFO blocks, a device never ends, a bomb of 3 MB unpacks to 10 GB: each is ref
 
 import bz2
 import io
-import json
 import os
 import stat
 import struct
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import wraps
 from pathlib import Path
-from typing import IO, Any, BinaryIO
+from typing import IO, BinaryIO, ParamSpec, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pipeline.load.geometry import LoadError, unusable
+from reports import texts
 
 GIB = 2**30
-TEXT_BYTES, SURFACE_BYTES = 64 * 2**20, 256 * 2**20
-"""Longest text (a curve, markups, a tree) and longest surface file: 5 million triangles."""
+SURFACE_BYTES = 256 * 2**20
+"""Longest surface file: 5 million triangles."""
 DEFLATED = 1032
 """Most bytes that deflate can pack into one: a header that asks for more was not written with these data."""
 LIKELY, LARGE = 250, GIB
 """More than LARGE bytes that were packed to less than 1/LIKELY hold nothing but one value: no scan, a bomb."""
-KINDS = {
-    stat.S_ISDIR: "a folder", stat.S_ISFIFO: "a pipe (FIFO)", stat.S_ISSOCK: "a socket", stat.S_ISCHR: "a device",
-    stat.S_ISBLK: "a device",
-}  # fmt: skip
-SYSTEM = ("/proc", "/sys", "/dev")
+P = ParamSpec("P")
+T = TypeVar("T")
 
 
-def status_of(path: Path) -> os.stat_result | None:
-    """What the system says of a path, or None where nothing is there; LoadError for a name that cannot be one."""
-    try:
-        str(path).encode()
-        return path.stat()
-    except (FileNotFoundError, NotADirectoryError):
-        return None
-    except UnicodeError:
-        raise unusable(ascii(str(path)), "the name is not UTF-8; allowed: names in UTF-8; rename the file") from None
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "the name holds a zero byte"
-        name = str(path) if len(str(path)) < 300 else f"{str(path)[:120]}... ({len(str(path))} characters)"
-        raise unusable(name, f"cannot be opened ({reason}); allowed: a file that can be read; check the path") from None
+def _of_a_scan(read: Callable[P, T]) -> Callable[P, T]:
+    """The reader of any file, which raises LoadError where it refuses one."""
+
+    @wraps(read)
+    def reading(*args: P.args, **named: P.kwargs) -> T:
+        try:
+            return read(*args, **named)
+        except texts.UnreadableError as error:
+            raise LoadError(str(error)) from None
+
+    return reading
+
+
+status_of, size_of, opened = _of_a_scan(texts.status_of), _of_a_scan(texts.size_of), _of_a_scan(texts.opened)
+read_text, read_json, read_toml = _of_a_scan(texts.read_text), _of_a_scan(texts.read_json), _of_a_scan(texts.read_toml)
 
 
 def is_folder(path: Path) -> bool:
@@ -55,56 +55,10 @@ def is_folder(path: Path) -> bool:
     return found is not None and stat.S_ISDIR(found.st_mode)
 
 
-def size_of(path: Path, most: float = float("inf")) -> int:
-    """Bytes of a regular file of at most ``most``; LoadError for anything else."""
-    found = status_of(path)
-    if found is None:
-        why = "no such file or folder; check the path in the manifest (relative to the manifest itself)"
-        raise unusable(path, why)
-    kind = next((name for test, name in KINDS.items() if test(found.st_mode)), "")
-    if not kind and str(path.resolve()).startswith(SYSTEM):
-        kind = "a file of the system"
-    if kind:
-        raise unusable(path, f"this is {kind}; allowed: a regular file; name the file itself")
-    if found.st_size == 0:
-        raise unusable(path, "the file is empty (0 bytes); expected content; copy it again")
-    if found.st_size > most:
-        size, limit = found.st_size / 2**20, most / 2**20
-        raise unusable(path, f"{size:.0f} MiB; allowed: {limit:.0f} MiB for a file of this kind; make it smaller")
-    return found.st_size
-
-
-def opened(path: Path) -> BinaryIO:
-    """A regular file, open for reading."""
-    size_of(path)
-    try:
-        return path.open("rb")
-    except OSError as error:
-        raise unusable(path, f"cannot be opened ({error.strerror}); check its permissions") from None
-
-
+@_of_a_scan
 def read_bytes(path: Path, most: int = SURFACE_BYTES) -> bytes:
     """A whole regular file of at most ``most`` bytes."""
-    size_of(path, most)
-    with opened(path) as file:
-        return file.read(most + 1)[:most]
-
-
-def read_text(path: Path, most: int = TEXT_BYTES) -> str:
-    """A whole text in UTF-8."""
-    try:
-        return read_bytes(path, most).decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        why = f"not UTF-8 text (byte {error.start}); allowed: a text file in UTF-8; save it again"
-        raise unusable(path, why) from None
-
-
-def read_json(path: Path, what: str) -> Any:
-    """The content of a JSON file; what : it should be, in words."""
-    try:
-        return json.loads(read_text(path))
-    except (ValueError, RecursionError):
-        raise unusable(path, f"no JSON; expected {what}; write it again") from None
+    return texts.read_bytes(path, most)
 
 
 class Deflated(io.RawIOBase):

@@ -16,8 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.load.geometry import refused
-from pipeline.load.guard import TEXT_BYTES, reachable, read_bytes, told
+from pipeline.load.guard import reachable, read_bytes, told
 from pipeline.model import Shapes
+from reports.texts import TEXT_BYTES
 
 MOST_UNPACKED = 256 * 2**20
 RADIUS = "MaximumInscribedSphereRadius"

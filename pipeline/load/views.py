@@ -9,7 +9,6 @@ matrix : 3 x 4, of homogeneous LPS mm to homogeneous pixels. Instead of it a C-a
 "corner_mm": [x, y, z] of pixel (0, 0) on the detector, "u_mm": [x, y, z], "v_mm": [x, y, z] from pixel to pixel}.
 """
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
@@ -18,6 +17,7 @@ import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from pipeline.load.geometry import unusable
+from pipeline.load.guard import read_json
 from pipeline.model import Array
 from pipeline.ranges import Finite, Vector
 from pipeline.wording import said, sentences
@@ -62,10 +62,11 @@ class _Frame(_Strict):
         if (self.matrix is None) == (self.c_arm is None):
             raise ValueError("give one of matrix and c_arm")
         try:
-            size = abs(float(np.linalg.det(self.projection[:, :3])))
+            rays = self.projection[:, :3]
+            spread = abs(float(np.linalg.det(rays))) > 1e-12 * float(np.abs(rays).max()) ** 3
         except np.linalg.LinAlgError:
-            size = 0.0
-        if size < 1e-12 * float(np.abs(self.projection[:, :3]).max()) ** 3:
+            spread = False
+        if not spread:
             raise ValueError("this projection has no point source (parallel rays, or a detector seen edge on)")
         return self
 
@@ -97,10 +98,10 @@ def read_views(path: Path, count: int | None) -> list[View]:
 
     count : None where it is not known.
     """
-    try:
-        data = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise unusable(path, f"cannot be read as projections: {error}") from None
+    expected = '{"isocentre_mm": [x, y, z], "leaf_mm": [x, y, z], "frames": [...]}'
+    data = read_json(path, expected)
+    if not isinstance(data, dict):
+        raise unusable(path, f"cannot be read as projections; expected {expected}")
     try:
         file = _File.model_validate(data)
     except ValidationError as error:

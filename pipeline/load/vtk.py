@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from pipeline.load.chain import one_chain
 from pipeline.load.geometry import refused
+from pipeline.load.guard import read_bytes
 from pipeline.load.surfaces import split_cells, to_lps
 from pipeline.model import Array
 
@@ -17,7 +18,7 @@ class _Legacy:
     """A file read word by word; arrays follow their head in text or, big endian, in bytes."""
 
     def __init__(self, path: Path) -> None:
-        self.path, self.raw = path, path.read_bytes()
+        self.path, self.raw = path, read_bytes(path)
         lines = self.raw.split(b"\n", 3)
         if len(lines) < 4 or not lines[0].startswith(b"# vtk DataFile"):
             raise refused(path, "no '# vtk DataFile' on top", "a legacy .vtk file", "export the wire as .csv or .vtp")

@@ -14,6 +14,7 @@ import numpy as np
 
 from pipeline.load.curves import READERS, read_csv_points
 from pipeline.load.geometry import LoadError, Source, refused, unusable
+from pipeline.load.guard import size_of
 from pipeline.load.stated import stated_in
 from pipeline.load.surfaces import RAS_TO_LPS
 from pipeline.load.vtk import read_vtk_points
@@ -89,12 +90,14 @@ def _in_hdf5(path: Path, count: int, space: str, unit: str) -> list[OtherFile]:
     """/frames/NNN/simulated_mm, NNN from 0, as in frames.h5: LPS mm by its layout."""
     if space not in ("", "LPS") or unit not in ("", "mm"):
         raise unusable(path, f"the layout of frames.h5 is LPS mm, stated was {space} {unit}; write CSV files instead")
+    size_of(path)
     try:
         with h5py.File(path, "r") as file:
             groups = {int(name): group for name, group in file["frames"].items()}
             points = {n: np.array(g["simulated_mm"], float) for n, g in groups.items() if "simulated_mm" in g}
-    except (OSError, KeyError, ValueError, AttributeError) as error:
-        raise refused(path, repr(error), "/frames/NNN/simulated_mm (n, 3), NNN from 0", "write it so") from None
+    except (OSError, KeyError, ValueError, AttributeError, TypeError, RuntimeError) as error:
+        what, allowed = "no HDF5 file, or one of another layout", "/frames/NNN/simulated_mm (n, 3), NNN from 0"
+        raise refused(path, what, allowed, "write it so") from error
     beyond = sorted(n for n in groups if not 0 <= n < count)
     if beyond:
         raise unusable(path, f"got frame {beyond[0]} for {count} frames; number them from 0 to {count - 1}")
@@ -105,7 +108,7 @@ def _in_hdf5(path: Path, count: int, space: str, unit: str) -> list[OtherFile]:
 
 def _read(path: Path, space: str, unit: str) -> OtherFile:
     """One file."""
-    if not path.exists() or path.stat().st_size == 0:
+    if not path.exists() or (path.is_file() and path.stat().st_size == 0):
         return OtherFile(path.name, problem="the file is empty, or not there", missing=True)
     kind = kind_of(path)
     try:

@@ -18,8 +18,8 @@ from pipeline.compare.nulls import ANOTHER
 from pipeline.model import Array
 from pipeline.run import ledger
 from pipeline.run.overall import Found, phantoms_of
-from reports.case_files import read_json
 from reports.frames_file import read_arrays
+from reports.records import read_json
 
 SAME_ENTRY_MM = 2.0
 """Traces that begin farther apart count their depths from different places and are not compared."""

@@ -1,6 +1,5 @@
 """Before a run writes into a folder: what lies there, and whether the new results may stand beside it."""
 
-import json
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
@@ -13,8 +12,9 @@ from pipeline.run.results import jsonable
 from pipeline.status import UsageError
 from pipeline.study.manifest import Case
 from pipeline.study.settings import Resolved
-from reports.case_files import find_cases, read_json
+from reports.case_files import find_cases
 from reports.origin import ABSENT, settings_of
+from reports.records import read_json
 
 
 def guard_apart(out: Path, folders: Iterable[Path]) -> None:
@@ -35,8 +35,8 @@ def guard_out(out: Path, manifest: Path, settings: Resolved) -> None:
     infos, wanted = sorted(out.glob("run*.json")), file_hash(manifest)
     for info in infos:
         try:
-            known = json.loads(info.read_text(encoding="utf-8")).get("manifest_sha256")
-        except (ValueError, AttributeError):
+            known = read_json(info).get("manifest_sha256")
+        except ValueError:
             raise UsageError([f"{info} is damaged; {allowed}"]) from None
         if known != wanted:
             raise UsageError([f"{out} was made from another manifest; name another folder, or {allowed}"])

@@ -34,8 +34,9 @@ from pipeline.study.check import frames_of
 from pipeline.study.manifest import Case, Manifest
 from pipeline.study.settings import to_toml
 from reports.atomic import WriteError, remove_leftovers, write_text, writing
-from reports.case_files import counted, left_over, read_json
+from reports.case_files import counted, left_over
 from reports.html import render_index
+from reports.records import read_json
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from typing import Literal
 from pydantic import TypeAdapter
 
 from reports.atomic import write_bytes
+from reports.records import read_json
 from reports.schema import BUDGET, ENTRIES, ERRORS, POINTS, TIMINGS
 
 FILE = "ledger.json"
@@ -84,8 +85,8 @@ def entry_of(path: Path) -> Entry:
 def read(folder: Path) -> Ledger | None:
     """The ledger of a case's folder; None where there is none, or one that cannot be read."""
     try:
-        return LEDGER.validate_json((folder / FILE).read_bytes())
-    except (OSError, ValueError):
+        return LEDGER.validate_python(read_json(folder / FILE))
+    except ValueError:
         return None
 
 

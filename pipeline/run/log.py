@@ -12,7 +12,7 @@ from typing import Any, Literal, TextIO
 import numpy as np
 
 from pipeline.model import Counters, Levels
-from reports.atomic import writing
+from reports.atomic import write_text, writing
 
 Stage = Literal["load", "segment", "trace", "simulate", "compare", "report"]
 STAGES: tuple[Stage, ...] = ("load", "segment", "trace", "simulate", "compare", "report")
@@ -109,10 +109,9 @@ def _spread(levels: dict[str, list[float]]) -> dict[str, dict[str, float]]:
 
 def last_stage(log: Path) -> str:
     """The last stage that a case's log names; empty where it names none."""
-    try:
-        lines = log.read_text(encoding="utf-8", errors="replace").splitlines()
-    except OSError:
+    if not log.is_file():
         return ""
+    lines = log.read_text(encoding="utf-8", errors="replace").splitlines()
     words = (line.partition("] ")[2].partition(" ")[0] for line in reversed(lines))
     return next((word for word in words if word in STAGES), "")
 
@@ -134,8 +133,7 @@ class CaseProgress:
 
     def start(self) -> None:
         """Empty the log file."""
-        with writing(self.log):
-            self.log.write_text("", encoding="utf-8")
+        write_text(self.log, "")  # in place of whatever stands there, as a pipe, on which nobody would read
 
     def __call__(self, stage: str, done: int, total: int, text: str) -> None:
         """One step of a stage is finished."""

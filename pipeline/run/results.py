@@ -25,6 +25,7 @@ from pipeline.status import FrameStatus
 from pipeline.study.manifest import Case
 from reports.atomic import write_text
 from reports.case_files import GOOD, find_cases
+from reports.records import AGAIN, read_json
 
 LOST = {
     "crashed": "the case ended in an unexpected error; its log has the traceback",
@@ -116,7 +117,7 @@ RESULT = TypeAdapter(Result)
 
 def read_result(path: Path) -> Result:
     """Read a result.json, without its details; ValueError where it is not one."""
-    return RESULT.validate_json(path.read_bytes())
+    return RESULT.validate_python(read_json(path))
 
 
 def found_results(out: Path) -> list[Result]:
@@ -130,9 +131,9 @@ def _found(folder: Path) -> Result:
     altered = f"{folder}: {wrong}; run the case again" * bool(wrong)
     try:
         result = read_result(path)
-    except (ValidationError, OSError) as error:
-        why = error.errors()[0]["msg"] if isinstance(error, ValidationError) else error
-        return lost(folder.name, "damaged", altered or f"{path}: {why}")
+    except ValueError as error:
+        what = f"{path}: it is missing, or a key of it; {AGAIN}" if isinstance(error, ValidationError) else str(error)
+        return lost(folder.name, "damaged", altered or what)
     if altered:
         return lost(folder.name, "damaged", altered, result)
     if result.case != folder.name:

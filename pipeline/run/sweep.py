@@ -16,8 +16,9 @@ from pipeline.run.results import LOST, Result, found_results, lost
 from pipeline.study.manifest import Case
 from pipeline.study.settings import Resolved, Setting, SettingsError, parse_assignment, resolve
 from reports import tables
-from reports.case_files import listed, read_json
+from reports.case_files import listed
 from reports.origin import mixed_settings
+from reports.records import read_json
 from reports.schema import SWEEP
 
 PLAIN = "(plain)"

@@ -20,7 +20,8 @@ from rich.table import Column
 from pipeline.run.case import Job
 from pipeline.run.ledger import RESULT
 from pipeline.run.log import STAGES
-from reports.case_files import GOOD, counted, read_json
+from reports.case_files import GOOD, counted
+from reports.records import read_json
 
 EVERY_S = 0.3
 STEP = re.compile(rf"\] ({'|'.join(STAGES)}) (\d+)/(\d+)  ")
@@ -127,7 +128,7 @@ class Watch:
         """Number of jobs done, with fractions for those that are running, and the latest log text of one of these."""
         done, heard = float(len(self._finished)), ""
         for log in (job.folder / "log.txt" for job in self.jobs if job.folder not in self._finished):
-            if log.exists() and log.stat().st_mtime >= self._start:
+            if log.is_file() and log.stat().st_mtime >= self._start:
                 text = log.read_text(encoding="utf-8", errors="replace")
                 done, heard = done + share_done(text), text.rstrip().rpartition(" s  ")[2][:60]
         return done, heard

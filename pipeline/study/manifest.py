@@ -3,7 +3,6 @@
 Everything that is wrong with it is listed at once.
 """
 
-import tomllib
 from collections import Counter
 from collections.abc import Iterator, Sequence, Set
 from contextlib import suppress
@@ -25,7 +24,7 @@ from pydantic import (
 from pydantic.config import JsonDict
 
 from pipeline.load.geometry import LoadError
-from pipeline.load.guard import read_text, status_of
+from pipeline.load.guard import read_toml, status_of
 from pipeline.model import OverWire, Uncertainty, Wall, Wire
 from pipeline.ranges import Axis, Depth, Direction, Finite, NonNegative, Number, Point, Positive
 from pipeline.status import InputError, did_you_mean
@@ -33,10 +32,7 @@ from pipeline.study.borrowed import borrowing_problems
 from pipeline.study.catheter import catheter_problems
 from pipeline.study.others import OthersText
 from pipeline.study.sources import MaskText, PathText, Sources, SourceText, Strict
-from pipeline.toml_words import not_toml
 from pipeline.wording import WRITTEN_HERE, Place, as_toml, said, saying, sentences
-
-MANIFEST_BYTES = 16 * 2**20
 
 
 def _wire(value: Any, info: ValidationInfo) -> Wire:
@@ -254,12 +250,9 @@ def read_manifest(path: Path) -> Manifest:
     try:
         if status_of(path) is None:
             raise ManifestError([f"{path}: no such manifest"])
-        text = read_text(path, MANIFEST_BYTES)
-        data = tomllib.loads(text)
+        data = read_toml(path)
     except LoadError as error:
         raise ManifestError([str(error)]) from None
-    except (ValueError, RecursionError) as error:
-        raise ManifestError([not_toml(path, text, error)]) from None
     context: dict[str, Any] = {"folder": path.parent}
     try:
         tables = ManifestTables.model_validate(data, context=context)

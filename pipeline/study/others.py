@@ -7,6 +7,8 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field
 from pydantic.config import JsonDict
 
+from pipeline.load.geometry import LoadError
+from pipeline.load.guard import is_folder, size_of, status_of
 from pipeline.load.order import natural_key
 from pipeline.load.wires import KINDS, kind_of
 from pipeline.status import UsageError
@@ -38,9 +40,10 @@ def found_for(case: str, place: Path, alone: bool) -> list[str]:
     """
     if any(mark in place.name for mark in "*?["):
         return _sorted(place.parent.glob(place.name)) if alone else _refuse(case, place, "a pattern serves one case")
-    if not place.exists():
+    if status_of(place) is None:
         raise UsageError([f"--curves {place}: no such file or folder"])
-    if place.is_file():
+    if not is_folder(place):
+        size_of(place)
         return [str(place)] if alone else _refuse(case, place, "one file serves one case")
     named = [place / "cases" / case / "frames.h5", place / case, place / f"{case}.h5", *[place] * alone]
     here = next((path for path in named if path.exists()), None)
@@ -69,6 +72,14 @@ def _refuse(case: str, place: Path, why: str) -> list[str]:
     raise UsageError([f"case {case!r}: --curves {place}: {why}; {do}"])
 
 
+def _there(text: str) -> bool:
+    """Whether a text, which may hold anything, is the name of something."""
+    try:
+        return status_of(Path(text)) is not None
+    except LoadError:
+        return False
+
+
 NO_NAMES = ("nan", "na", "n.a", "null", "none")
 
 
@@ -76,7 +87,7 @@ def named(texts: Sequence[str]) -> dict[str, Path]:
     """``NAME=PLACE`` texts by name; one without a name is called as its folder is. Raises UsageError."""
     found: dict[str, Path] = {}
     for text in texts:
-        name, equals, place = text.partition("=") if "=" in text and not Path(text).exists() else ("", "", text)
+        name, equals, place = text.partition("=") if "=" in text and not _there(text) else ("", "", text)
         name = name if equals else Path(place).absolute().stem
         if not name.replace("-", "").replace("_", "").replace(".", "").isalnum() or name.lower() == "wireval":
             raise UsageError([f"--curves {text!r}: the name {name!r}: letters, digits, - . _, and not 'wireval'"])

@@ -4,7 +4,6 @@ A case is known again by the content of its frames and traces, whatever it is ca
 nothing about the model, and is not scored unless that is asked for.
 """
 
-import tomllib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -12,9 +11,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from pipeline.load.geometry import LoadError
+from pipeline.load.guard import read_toml, status_of
 from pipeline.ranges import Finite, FiniteProfile, NonNegative, Positive, PositiveProfile
 from pipeline.status import InputError
-from pipeline.toml_words import not_toml
 from pipeline.wording import said, sentences
 
 if TYPE_CHECKING:
@@ -99,18 +99,12 @@ class ParametersError(InputError):
 def read_parameters(path: Path) -> Parameters:
     """Read parameters.toml; raises ParametersError."""
     try:
-        text = path.read_text(encoding="utf-8")
-        data = tomllib.loads(text)
-    except FileNotFoundError:
-        raise ParametersError(
-            [f"{path}: no such file; wireval calibrate MANIFEST -o OUT writes OUT/parameters.toml"]
-        ) from None
-    except OSError as error:
-        raise ParametersError([f"{path}: cannot be read: {error.strerror}; name a file"]) from None
-    except UnicodeDecodeError as error:
-        raise ParametersError([f"{path}: not UTF-8 text (byte {error.start}); save it again in UTF-8"]) from None
-    except tomllib.TOMLDecodeError as error:
-        raise ParametersError([not_toml(path, text, error)]) from None
+        if status_of(path) is None:
+            what = "no such file; wireval calibrate MANIFEST -o OUT writes OUT/parameters.toml"
+            raise ParametersError([f"{path}: {what}"])
+        data = read_toml(path)
+    except LoadError as error:
+        raise ParametersError([str(error)]) from None
     try:
         return Parameters.model_validate(data)
     except ValidationError as error:

@@ -4,7 +4,6 @@ Command line > config file > default; unknown or ill-typed ones are all listed.
 """
 
 import json
-import tomllib
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
@@ -16,13 +15,13 @@ from pipeline.budget.config import BudgetConfig
 from pipeline.compare.config import CompareConfig
 from pipeline.load import LoadError
 from pipeline.load.config import LoadConfig
-from pipeline.load.guard import read_text, status_of
+from pipeline.load.guard import read_toml, status_of
 from pipeline.segment.config import SegmentConfig
 from pipeline.simulate.config import SimulateConfig, SolverConfig
 from pipeline.status import InputError, did_you_mean
-from pipeline.toml_words import not_toml
 from pipeline.trace.config import TraceConfig
 from pipeline.wording import said, sentences
+from reports.texts import MalformedError, UnreadableError, toml_of
 
 
 @dataclass(frozen=True)
@@ -83,9 +82,11 @@ def parse_assignment(text: str, source: str = "command line") -> Setting:
     if not equals or "." not in name:
         raise SettingsError([f"{source}: {text!r} is no setting; write table.key=value, as in solver.segment_mm=0.5"])
     try:
-        value = tomllib.loads(f"value = {raw.strip()}")["value"]
-    except tomllib.TOMLDecodeError:
+        value = toml_of(f"value = {raw.strip()}", f"{source}: {name.strip()}")["value"]
+    except MalformedError:
         value = raw.strip()
+    except UnreadableError as error:
+        raise SettingsError([str(error)]) from None
     return Setting(name.strip(), value, source)
 
 
@@ -94,12 +95,9 @@ def read_settings(path: Path) -> list[Setting]:
     try:
         if status_of(path) is None:
             raise SettingsError([f"{path}: no such file; wireval settings prints one"])
-        text = read_text(path)
-        data = tomllib.loads(text)
+        data = read_toml(path)
     except LoadError as error:
         raise SettingsError([str(error)]) from None
-    except tomllib.TOMLDecodeError as error:
-        raise SettingsError([not_toml(path, text, error)]) from None
     found: list[Setting] = []
     for table, values in data.items():
         if not isinstance(values, dict):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,7 @@ from data_synthetic.anatomy.vessel_in_scan import find_vessel, find_way
 from data_synthetic.catalogue import background_scene, build, from_anatomy
 from data_synthetic.geometry import ScanGrid, voxels_near
 from data_synthetic.scanner.coverage import lumen_coverage
+from data_synthetic.write import alone, earlier_files
 from data_synthetic.write.volumes import to_image
 from tests.data_synthetic.grids import centred_grid
 
@@ -82,6 +84,40 @@ def test_bad_anatomies_are_refused_by_name(tmp_path: Path) -> None:
     (tmp_path / "b.swc").write_text("1 2 3\n", encoding="utf-8")
     with pytest.raises(ValueError, match="7"):
         read_tree(tmp_path / "b.swc")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "", "[1]", '{"markups": [{"controlPoints": 5}]}', '{"a":' * 50_000 + "1" + "}" * 50_000, '{"markups": 5}',
+        '{"markups": [{"controlPoints": [{"position": [1, 2]}]}]}', f'{{"markups": {"9" * 5000}}}',
+        f'{{"markups": [{{"controlPoints": [{{"position": [1, 2, 1{"0" * 400}]}}]}}]}}',
+        '{"markups": [{"controlPoints": [{"position": [1, 2, 3]}], "measurements": [5]}]}',
+    ],
+    ids=range(9),
+)  # fmt: skip
+def test_markups_that_are_none_are_refused(tmp_path: Path, text: str) -> None:
+    """Errors of Python's own, or its words alone."""
+    (tmp_path / "a.mrk.json").write_text(text, encoding="utf-8")
+    with pytest.raises(ValueError, match=r"a\.mrk\.json: cannot be read; allowed: a 3D Slicer markups file"):
+        read_tree(tmp_path / "a.mrk.json")
+
+
+def test_an_earlier_study_may_be_anything(tmp_path: Path) -> None:
+    (tmp_path / "manifest.toml").write_text("case = [{}]", encoding="utf-8")
+    (tmp_path / "truth.json").write_text("[" * 50_000, encoding="utf-8")
+    assert earlier_files(tmp_path) == []
+    (tmp_path / "manifest.toml").unlink()
+    os.mkfifo(tmp_path / "manifest.toml")
+    assert earlier_files(tmp_path) == []
+    assert len(alone(tmp_path)) == 1
+
+
+@pytest.mark.parametrize("text", ["1 0 x 0 0 1 -1", "1 0 nan 0 0 1 -1"])
+def test_trees_that_are_none_are_refused(tmp_path: Path, text: str) -> None:
+    (tmp_path / "a.swc").write_text(text, encoding="utf-8")
+    with pytest.raises(ValueError, match=r"a\.swc: (cannot be read; allowed|got numbers that are not finite)"):
+        read_tree(tmp_path / "a.swc")
 
 
 def test_smoothing_keeps_ends_and_never_folds() -> None:

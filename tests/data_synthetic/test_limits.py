@@ -29,6 +29,10 @@ from tests.studies.catalogue import size_of
         (Wanted(voxel_mm=float("nan")), "voxel-mm: got nan"),
         (Wanted(voxel_mm=float("inf")), "voxel-mm: got inf"),
         (Wanted(seed=-1), "seed: got -1; allowed: 0 or more"),
+        (Wanted(size=10**6), "size: got 1000000; allowed: up to 1500"),
+        (Wanted(size=10**4000), "size: got a number of more than 20 digits; allowed: up to 1500"),
+        (Wanted(frames=10**4000), "frames: got a number of more than 20 digits; allowed: up to 10000"),
+        (Wanted(seed=10**4000), "seed: got a number of more than 20 digits"),
     ],
 )
 def test_numbers_that_cannot_be_meant(wanted: Wanted, expected: str) -> None:

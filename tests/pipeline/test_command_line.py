@@ -39,6 +39,15 @@ def scans(study: Path, tmp_path: Path) -> Path:
     return folder
 
 
+TOO_LONG = (
+    "check LONG", "check STUDY -c LONG", "run LONG -o y", "run STUDY -o LONG", "run STUDY -o y --junit LONG",
+    "run STUDY -o y --parameters LONG", "score STUDY -o y --curves LONG", "score STUDY -o y --curves x=LONG",
+    "init STUDY --to y --reference LONG", "synth --anatomy LONG -o y", "synth --background LONG -o y", "report LONG",
+    "diff LONG y", "diff STUDY STUDY --tolerance LONG", "diff STUDY STUDY --json LONG",
+)  # fmt: skip
+"""Names that no system takes."""
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
@@ -82,7 +91,10 @@ def scans(study: Path, tmp_path: Path) -> Path:
         ("run STUDY -o y -c STUDY", "this is a folder"),
         ("run STUDY -o y -c STUDY/none.toml", "none.toml: no such file; wireval settings prints one"),
         ("synth straight -o y --format foo", "--format 'foo': allowed: 'mha', 'nrrd'"),
-        ("bench -o y --stress --scenes -1", "--scenes -1: expected 1 or more"),
+        ("bench -o y --stress --scenes -1", "--scenes -1: expected 1 to 1000000"),
+        (f"bench -o y --stress --scenes 1{4000 * '0'}", "--scenes of more than 12 digits: expected 1 to 1000000"),
+        *((words.replace("LONG", 5000 * "n"), "(File name too long)") for words in TOO_LONG),
+        ("score STUDY --curves x=/dev/zero -o y", "/dev/zero: this is a device; allowed: a regular file"),
         ("bench -o y --snaps --seed -1", "--seed -1: expected 0 or more"),
         ("bench STUDY -o y --stress", "leave the manifest out"),
         ("cache", "missing: one of --info, --check, --limit, --prune"),

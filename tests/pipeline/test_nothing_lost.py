@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import json
 import os
+import re
 import shutil
 import signal
 import threading
@@ -24,6 +25,8 @@ from pipeline.run.cache import Store
 from pipeline.run.occupied import held, owner_of
 from pipeline.run.outcome import Outcome
 from pipeline.run.stages import STEPS, Context, Known
+from pipeline.status import InputError
+from pipeline.wireval import read_results
 from reports import atomic
 from tests.studies.trees import differences
 
@@ -162,6 +165,61 @@ def test_a_damaged_case_is_pooled_nowhere_and_says_why(out: Path, how: str) -> N
     assert pd.read_csv(out / "overall.csv").empty
     words = "is not as it was written" if how == "altered" else "is missing"
     assert f"errors.csv {words}; run" in pd.read_csv(out / "failures.csv")["message"][0]
+
+
+SPOILT = {
+    "empty": "", "a list": "[1]", "config": '{"config": []}', "deep": '{"a":' * 50_000 + "1" + "}" * 50_000,
+    "a number": f'{{"a": {"9" * 5000}}}', "a pipe": None, "a folder": None,
+}  # fmt: skip
+
+
+def spoil(path: Path, how: str) -> None:
+    path.unlink()
+    if how in ("a pipe", "a folder"):
+        (os.mkfifo if how == "a pipe" else os.mkdir)(path)
+    else:
+        path.write_text(str(SPOILT[how]), encoding="utf-8")
+
+
+@pytest.mark.parametrize("how", SPOILT)
+def test_a_record_of_a_run_that_is_none_is_named(
+    study: Path, out: Path, how: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """They blocked, or ended in errors of Python's own."""
+    spoil(out / "run.json", how)
+    assert main(["report", str(out), "--overview"]) == 2
+    assert capsys.readouterr().err.startswith(f"{out / 'run.json'}: ")
+    assert main(["diff", str(out), str(out)]) == 2
+    assert capsys.readouterr().err.startswith(f"{out / 'run.json'}: ")
+    assert run(study, out) == 2
+    assert "run.json is damaged; say --resume" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["result.json", "ledger.json", "errors.csv", "frames.h5"])
+@pytest.mark.parametrize("how", SPOILT)
+def test_a_file_of_a_case_that_is_none_is_named(
+    out: Path, how: str, name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    spoil(case_of(out) / name, how)
+    assert main(["report", str(out), "--overview"]) == 1
+    assert re.search(rf"bifurcation: {case_of(out)}: {name} is (not as it was|missing)", capsys.readouterr().err)
+    assert list(pd.read_csv(out / "summary.csv")["status"]) == ["damaged"]
+
+
+def test_a_result_of_another_kind_is_damaged_without_its_ledger_too(out: Path) -> None:
+    path = case_of(out) / "result.json"
+    path.write_text(json.dumps(json.loads(path.read_text(encoding="utf-8")) | {"config": []}), encoding="utf-8")
+    (case_of(out) / "ledger.json").unlink()
+    assert main(["report", str(out), "--overview"]) == 1
+    assert main(["diff", str(out), str(out)]) == 2
+    with pytest.raises(InputError, match=r"result\.json: config is of another kind than expected"):
+        read_results(out)
+
+
+def test_a_log_that_is_a_pipe_does_not_block(study: Path, whole: Path, out: Path) -> None:
+    spoil(case_of(out) / "log.txt", "a pipe")
+    assert run(study, out, "--fresh") == 0
+    assert (case_of(out) / "log.txt").is_file()
 
 
 def test_report_heals_pages(study: Path, whole: Path, out: Path) -> None:

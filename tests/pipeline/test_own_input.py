@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import json
+import os
+import re
 import struct
+from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,13 +16,22 @@ from scipy.spatial.transform import Rotation
 from skimage.measure import marching_cubes
 
 from pipeline.load import LoadError
-from pipeline.load.curves import read_curve
-from pipeline.load.geometry import Mask
+from pipeline.load.curves import read_curve, read_truth
+from pipeline.load.geometry import Mask, Source
 from pipeline.load.lumens import read_lumen
+from pipeline.load.views import read_views
+from pipeline.load.wires import read_wires
 from pipeline.model import Shapes
 from pipeline.segment.config import SegmentConfig
 from pipeline.segment.given import given_lumen
+from pipeline.status import InputError
+from pipeline.study.manifest import read_manifest
+from pipeline.study.parameters import read_parameters
+from pipeline.study.settings import SettingsError, parse_assignment, read_settings
 from reports.export import write_markups_curve, write_polyline_vtp, write_surface_vtp
+from reports.records import read_json
+from reports.texts import UnreadableError
+from reports.tolerance import load_tolerance
 from tests.fuzz.inputs import markups, stl, tetrahedra, vtp
 
 RADIUS, LENGTH = 1.5, 12.0
@@ -278,3 +291,51 @@ def test_the_distance_to_a_surface_of_large_triangles_is_that_to_the_solid_it_en
     near = np.abs(exact) < 1.5
     # a spline of the distance rounds the edges, a tenth of a voxel here; a triangle that is missed leaves voxels
     np.testing.assert_allclose(found.values[near], exact[near], rtol=0.0, atol=0.05)
+
+
+READERS: dict[str, Callable[[Path], object]] = {
+    "manifest": read_manifest, "parameters": read_parameters, "settings": read_settings, "tolerance": load_tolerance,
+    "projections": lambda path: read_views(path, None), "truth": lambda path: read_truth(path, None),
+    "record": read_json,
+}  # fmt: skip
+DAMAGED = {
+    "pipe": "this is a pipe (FIFO)", "folder": "this is a folder", "empty": "the file is empty",
+    "not UTF-8": "not UTF-8 text", "deep": "more than 50 deep", "less deep": "more than 50 deep",
+    "5,000 digits": "of more than 300 digits", "400 digits": "of more than 300 digits", "neither": "",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("what", READERS)
+@pytest.mark.parametrize("how", DAMAGED)
+def test_a_small_text_may_be_anything(tmp_path, what, how):
+    """They blocked on a pipe, and ended in errors of Python's own or in its words alone."""
+    path, json_too = tmp_path / "file", what in ("projections", "truth", "record")
+    nested = {"deep": 50_000, "less deep": 200}.get(how, 0)
+    number = "9" * {"5,000 digits": 5000, "400 digits": 400}.get(how, 1)
+    value = "[" * nested + number + "]" * nested
+    text = (f'{{"frames": {value}}}' if json_too else f"schema = {value}").encode()
+    if how == "pipe":
+        os.mkfifo(path)
+    elif how == "folder":
+        path.mkdir()
+    else:
+        path.write_bytes({"empty": b"", "not UTF-8": b"\xff", "neither": b"[[["}.get(how, text))
+    with pytest.raises((LoadError, InputError, UnreadableError)) as caught:
+        READERS[what](path)
+    assert str(caught.value).startswith(f"{path}")
+    assert DAMAGED[how] in str(caught.value)
+    assert not re.search(r"Error|codec|set_int|Expecting|\(char", str(caught.value))
+
+
+@pytest.mark.parametrize("value", ["[" * 50_000 + "]" * 50_000, "9" * 5000], ids=["deep", "long"])
+def test_a_setting_on_the_command_line_may_be_anything(value):
+    with pytest.raises(SettingsError, match=r"budget\.seed: (lists or tables|a whole number of) more than"):
+        parse_assignment(f"budget.seed={value}")
+
+
+@pytest.mark.parametrize("ending", [".csv", ".vtk", ".vtp", ".mrk.json"])
+def test_wires_that_are_pipes_are_called_so(tmp_path, ending):
+    """They were empty, or not there; that of a .vtk blocked."""
+    os.mkfifo(tmp_path / f"f{ending}")
+    (found,) = read_wires([Source(tmp_path / f"f{ending}")], 1, "LPS", "mm")
+    assert "this is a pipe (FIFO)" in found.problem

@@ -44,6 +44,11 @@ def test_wrong_words(tmp_path: Path, capsys: pytest.CaptureFixture[str], words: 
         (["bend", "--voxel-mm", "-0.5"], "voxel-mm: got -0.5; allowed: above 0"),
         (["bend", "--voxel-mm", "nan"], "voxel-mm: got nan; allowed: above 0"),
         (["bend", "--seed", "-1"], "seed: got -1; allowed: 0 or more"),
+        (["bend", "--size", "1000000"], "size: got 1000000; allowed: up to 1500 (65 GiB of memory)"),
+        (["bend", "--size", "1" + "0" * 4000], "size: got a number of more than 20 digits; allowed: up to 1500"),
+        (["bend", "--frames", "1" + "0" * 4000], "frames: got a number of more than 20 digits; allowed: up to 10000"),
+        (["bend", "--frames", "1" + "0" * 9, "--insertions", "2"], "frames: got 1000000000; allowed: up to 10000"),
+        (["bend", "--insertions", "1" + "0" * 4000], "--insertions: expected 1 to 1000"),
     ],
 )
 def test_wrong_numbers_are_refused_before_any_truth_is_computed(
@@ -55,6 +60,31 @@ def test_wrong_numbers_are_refused_before_any_truth_is_computed(
     assert expected in said[0]
     assert said[1:] == ["1 problem in the command line; nothing was run"]
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("more", [[], ["--insertions", "2"]], ids=["one", "several"])
+def test_a_full_disk_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, more: list[str]
+) -> None:
+    """ITK raises a RuntimeError."""
+
+    def full(*_: object, **__: object) -> None:
+        raise RuntimeError("Exception thrown in WriteImage: ... No space left on device.")
+
+    monkeypatch.setattr("SimpleITK.WriteImage", full)
+    assert main(["synth", "bend", "--size", "48", "--frames", "1", *more, "-o", str(tmp_path / "out")]) == 1
+    assert "cannot be written: No space left on device; make room" in capsys.readouterr().err
+
+
+def test_scans_that_do_not_fit_into_memory_are_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def build(*_: object, **__: object) -> None:
+        raise MemoryError
+
+    monkeypatch.setattr("data_synthetic.catalogue.build", build)
+    assert main(["synth", "bend", "-o", str(tmp_path / "out")]) == 2
+    assert "the scans do not fit into memory; give a smaller --size" in capsys.readouterr().err
 
 
 def test_a_study_written_over_an_earlier_one_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

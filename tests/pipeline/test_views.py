@@ -231,13 +231,19 @@ def test_projections_that_are_none_are_refused(known: Known, tmp_path: Path) -> 
         ({"frames": [{"c_arm": arm, "points_px": [[0, 0], [0, 0]]}] * 4}, "two different points"),
         ({"frames": [{"c_arm": arm, "points_px": [[0, 0], [0, float("nan")]]}] * 4}, "points_px"),
         ({"frames": [{"matrix": np.eye(4)[[0, 1, 3]].tolist(), "points_px": [[0, 0], [1, 1]]}] * 4}, "source"),
+        ({"frames": [{"matrix": [[0.0] * 4] * 3, "points_px": [[0, 0], [1, 1]]}] * 4}, "no point source"),
+        ({"frames": [{"c_arm": dict.fromkeys(arm, [0.0] * 3), "points_px": [[0, 0], [1, 1]]}] * 4}, "no point source"),
         ({"translate": "none"}, "translate"),
     ):
         file.write_text(json.dumps(good | change), encoding="utf-8")
         with pytest.raises(LoadError, match=said):
             read_views(file, 4)
+    for text in ("[1]", "5"):
+        file.write_text(text, encoding="utf-8")
+        with pytest.raises(LoadError, match="cannot be read as projections; expected"):
+            read_views(file, 4)
     file.write_text("{", encoding="utf-8")
-    with pytest.raises(LoadError, match="cannot be read as projections"):
+    with pytest.raises(LoadError, match="no JSON; expected"):
         read_views(file, 4)
 
 

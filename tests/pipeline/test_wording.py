@@ -17,7 +17,7 @@ from pipeline.study.explain import described
 from pipeline.study.manifest import Case, ManifestError, read_manifest
 from pipeline.study.parameters import ParametersError, read_parameters
 from pipeline.study.settings import SettingsError, parse_assignment, resolve
-from pipeline.toml_words import not_toml
+from reports.toml_words import not_toml
 
 WRONG = (
     '"auto"', '"5"', '""', "true", "[]", "{}", "{a = 1}", "[1, 2]", '["a", "b", "c"]', "[[0.0, 1.0], [1.0]]",
