@@ -161,10 +161,8 @@ def _one(args: Namespace) -> int:
 
 def _several(args: Namespace) -> int:
     """Several insertions into one phantom, shared out among processes; as ``main``."""
-    from concurrent.futures import ProcessPoolExecutor
-    from functools import partial
-
     from data_synthetic.write import alone, in_the_way, write_all_of_them
+    from pipeline.run.helpers import shared
 
     clock = perf_counter()
     try:
@@ -178,8 +176,8 @@ def _several(args: Namespace) -> int:
     if problems:
         return complain(problems, "the command line")
     shares = [range(first, args.insertions, args.jobs) for first in range(min(args.jobs, args.insertions))]
-    with ProcessPoolExecutor(len(shares)) as pool:
-        parts = {number: text for part in pool.map(partial(_share, args), shares) for number, text in part.items()}
+    done = shared(lambda number, _: _share(args, shares[number]), len(shares), len(shares))
+    parts = {number: text for part in done for number, text in part.items()}
     manifest = write_all_of_them([parts[number] for number in sorted(parts)], args.out)
     say(f"{scene.name}: {len(parts)} insertions written in {perf_counter() - clock:.0f} s.  manifest: {manifest}")
     return 0

@@ -384,7 +384,7 @@ def test_what_is_no_summary_is_not_replaced_by_one(
     scan.write_bytes(b"ObjectType = Image\n")
     os.mkfifo(pipe)
     words = ["run", str(study), "-o", str(tmp_path / "out")] if name == "junit" else ["diff", str(study), str(study)]
-    for path, said in ((scan, "no earlier summary"), (pipe, "a device or a pipe"), (long, "name another file")):
+    for path, said in ((scan, "no earlier summary"), (pipe, "a device or a pipe"), (long, "too long")):
         assert main([*words, f"--{name}", str(path)]) == 2
         assert said in capsys.readouterr().err
     assert scan.read_bytes() == b"ObjectType = Image\n"

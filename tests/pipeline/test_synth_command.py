@@ -4,7 +4,12 @@ from __future__ import annotations
 
 import importlib.util
 import json
+import signal
+import subprocess
+import sys
+import time
 import tomllib
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -156,3 +161,25 @@ def test_friction_of_the_true_wire_is_in_its_truth_and_its_manifest(tmp_path: Pa
         truth = [json.loads((out / case["truth"]).read_text(encoding="utf-8")) for case in cases]
         ends[out.name] = np.array([one["frames"][-1]["points_mm"][-1] for one in truth])
     assert np.all(np.linalg.norm(ends["0.3"] - ends["none"], axis=1) > 0.01)
+
+
+@pytest.mark.parametrize("how", [signal.SIGTERM, signal.SIGKILL])
+def test_no_process_outlives_the_command(how: signal.Signals, tmp_path: Path) -> None:
+    """Insertions were drawn to their end, minutes after the command had been ended."""
+    words = ["synth", "circle-of-willis", "-o", str(tmp_path), "--insertions", "4", "--size", "192", "-j", "2"]
+    command = subprocess.Popen([sys.executable, "-m", "pipeline", *words], stderr=subprocess.DEVNULL)
+    children = Path(f"/proc/{command.pid}/task/{command.pid}/children")
+    _until(lambda: bool(children.read_text(encoding="ascii").split()))
+    helpers = [Path("/proc") / number for number in children.read_text(encoding="ascii").split()]
+    command.send_signal(how)
+    assert command.wait() == (143 if how == signal.SIGTERM else -how)
+    _until(lambda: not any(helper.exists() for helper in helpers))
+
+
+def _until(holds: Callable[[], bool]) -> None:
+    """Wait until it holds: for a minute, a fraction of what all insertions take."""
+    for _ in range(600):
+        if holds():
+            return
+        time.sleep(0.1)
+    raise AssertionError("it never held")
