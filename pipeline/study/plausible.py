@@ -10,7 +10,7 @@ from pipeline.load.curves import read_truth
 from pipeline.model import Array, Wire, arc_length
 from pipeline.simulate.others import oddity
 from pipeline.study.manifest import Case
-from pipeline.study.same_scans import shared
+from pipeline.study.same_scans import continued, shared
 from pipeline.study.settings import Config
 
 RADII_MM = (0.1, 0.5)
@@ -167,6 +167,7 @@ def doubts(cases: Sequence[Case], config: Config) -> Iterator[str]:
         said += odd_truth(case, read_truth(case.truth, None)) if case.truth else []
         yield from (f"case {case.id!r}: {text}" for text in said)
     yield from shared(cases)
+    yield from continued(cases)
 
 
 MEASURES = "compare.skip_mm", "compare.sample_mm", "compare.simulated_nulls", "trace.length_tolerance_mm"

@@ -4,7 +4,7 @@ import filecmp
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
-from itertools import combinations
+from itertools import combinations, pairwise
 from pathlib import Path
 
 from pipeline.load import LoadError, Source
@@ -78,6 +78,28 @@ def shared(cases: Sequence[Case]) -> list[str]:
         + ("its frame counts twice" if same_group else "they count as one insertion, as with the same group")
         for (one, two), (path, same_group) in found.items()
     ]
+
+
+def continued(cases: Sequence[Case]) -> list[str]:
+    """A sentence for cases that look like one insertion cut in parts: stated alike, with depths that follow each other.
+
+    A second insertion with the same fixation begins at the front again, or is rolled otherwise.
+    """
+    alike: dict[object, list[Case]] = defaultdict(list)
+    for case in cases:
+        if case.insertion_mm and case.reference is not None and case.group == case.id:
+            where = tuple(case.entry_mm), tuple(case.entry_direction), str(case.stated_roll_deg), case.wire.name
+            alike[where, _place(case.reference)].append(case)
+    said = []
+    for group in alike.values():
+        parts = sorted((min(case.insertion_mm or ()), max(case.insertion_mm or ()), case.id) for case in group)
+        if len(parts) > 1 and all(before[1] < after[0] for before, after in pairwise(parts)):
+            named = ", ".join(f"{name} ({first:g} to {last:g} mm)" for first, last, name in parts)
+            said.append(
+                f"cases {named} have one reference, entry, wire and roll, and depths that follow each other: they "
+                f"count as {len(parts)} insertions; are they parts of one? then give them one group"
+            )
+    return said
 
 
 def _place(source: Source) -> tuple[str, str]:

@@ -13,6 +13,7 @@ from pipeline.load import Header, Source
 from pipeline.load.order import natural_key
 from pipeline.study.manifest import ManifestError, read_manifest
 from pipeline.study.plausible import implausible, measured_otherwise, odd_depths, wrapped_rolls
+from pipeline.study.same_scans import continued
 from pipeline.study.settings import Config
 
 GOOD = """
@@ -201,3 +202,29 @@ def test_a_roll_that_goes_round_the_long_way_is_said(tmp_path: Path, rolls: list
     found = wrapped_rolls(case)
     assert (said in found[0]) if said else not found
     assert not said or found[0].endswith(("has 370", "has -185"))
+
+
+@pytest.mark.parametrize(
+    ("depths", "more", "said"),
+    [
+        (("[5, 9]", "[12, 20]"), ("", ""), True),
+        (("[5, 12]", "[9, 20]"), ("", ""), False),
+        (("[5, 9]", "[12, 20]"), ("", "roll_deg = 30.0"), False),
+        (("[5, 9]", "[12, 20]"), ('group = "one"', 'group = "one"'), False),
+    ],
+)
+def test_an_insertion_in_two_cases_is_doubted(
+    tmp_path: Path, depths: tuple[str, str], more: tuple[str, str], said: bool
+) -> None:
+    """Four parts of one insertion counted as four insertions, with an interval."""
+    head, case = GOOD.split("[[case]]")
+    parts = [
+        case.replace("run1", f"part{n}").replace(
+            'frames = "frames/*.mha"', f'frames = ["frames/f_{n}.mha", "frames/f_10.mha"]'
+        )
+        + f'reference = "frames/a.mha"\ninsertion_mm = {depths[n - 1]}\n{more[n - 1]}\n'
+        for n in (1, 2)
+    ]
+    found = continued(read_manifest(written(tmp_path, "[[case]]".join([head, *parts]))).cases)
+    assert len(found) == said
+    assert all("part1 (5 to 9 mm), part2 (12 to 20 mm)" in text for text in found)
