@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import json
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from pipeline.load import Header, Source
+from pipeline.load import Header, LoadError, Source
+from pipeline.load.curves import read_truth
 from pipeline.load.order import natural_key
+from pipeline.model import Array
 from pipeline.study.manifest import ManifestError, read_manifest
-from pipeline.study.plausible import implausible, measured_otherwise, odd_depths, wrapped_rolls
+from pipeline.study.plausible import implausible, measured_otherwise, odd_depths, odd_truth, wrapped_rolls
 from pipeline.study.same_scans import continued
 from pipeline.study.settings import Config
 
@@ -228,3 +232,32 @@ def test_an_insertion_in_two_cases_is_doubted(
     found = continued(read_manifest(written(tmp_path, "[[case]]".join([head, *parts]))).cases)
     assert len(found) == said
     assert all("part1 (5 to 9 mm), part2 (12 to 20 mm)" in text for text in found)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda wires: wires, ""),
+        (lambda wires: wires[::-1], "frame 0 cannot be its wire: it is 20.0 mm long, insertion_mm states 8"),
+        (lambda wires: [wire[::-1] for wire in wires], "passes 8 mm from entry_mm"),
+        (lambda wires: [wires[0], wires[1] + [9.0, 0.0, 0.0]], "frame 1 cannot be its wire: its base passes 9 mm"),
+    ],
+)
+def test_a_truth_of_other_frames_is_doubted(
+    tmp_path: Path, change: Callable[[list[Array]], list[Array]], said: str
+) -> None:
+    """Frames in reverse, or wires from tip to base: truth_rms_mm of 16 mm, ok, and no word."""
+    (case,) = read_manifest(written(tmp_path, GOOD + "insertion_mm = [8.0, 20.0]\n", frames=2)).cases
+    start = np.array([1.0, 2.0, 3.0])
+    wires = [start + np.outer(np.arange(0.0, mm + 0.1, 0.5), [0.0, 0.0, 1.0]) for mm in (8.0, 20.0)]
+    wires = [wire + np.outer((wire[:, 2] - 3.0) ** 2 / 400.0, [1.0, 0.0, 0.0]) for wire in wires]
+    found = odd_truth(case, change(wires))
+    assert len(found) == bool(said)
+    assert all(said in text for text in found), found
+
+
+def test_a_truth_of_one_point_is_none(tmp_path: Path) -> None:
+    path = tmp_path / "truth.json"
+    path.write_text(json.dumps({"frames": [{"points_mm": [[0.0, 0.0, 0.0]] * 10}]}), encoding="utf-8")
+    with pytest.raises(LoadError, match="frame 0 holds 1 points; expected two or more, apart"):
+        read_truth(path, 1)
