@@ -153,7 +153,10 @@ def _in_line(points: Array, end: Array, heading: Array) -> bool:
 
 def _goes_on(scene: _Scene, rays: _Rays) -> float:
     """The radius, mm, of the vessel at an end, if what its rays meet lies in line, is as wide and as bright; or 0."""
-    spacing, radius, gap = np.asarray(scene.scan.spacing_mm), float(rays.radius.max()), float(rays.gap.min())
+    spacing, gap = np.asarray(scene.scan.spacing_mm), float(rays.gap.min())
+    # at an oblique end no ray goes through the vessel's middle
+    around = rays.radius.max() * (np.indices((13, 13, 13)).reshape(3, -1).T - 6.0) / 2.0
+    radius = float(scene.depth(rays.at.mean(axis=0) + around / spacing).max())
     middle = np.mean(rays.at + 0.5 * rays.gap[:, None] * rays.normal, axis=0)
     step = (0.5 * gap + AROUND * radius) / HALF
     ball = np.moveaxis(np.indices((2 * HALF + 1,) * 3), 0, -1) - HALF

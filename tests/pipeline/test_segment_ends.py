@@ -81,7 +81,7 @@ def test_each_of_two_vessels_of_a_fork_that_a_band_crosses_is_said():
     fork = np.minimum(tube(one, 1.4), tube(other, 1.4))
     found = places(said(scan(fork, np.where(np.abs(Z - MIDDLE) < 1.2, 0.0, 1.0))))
     assert len(found) == 2
-    np.testing.assert_allclose(np.sort(found[:, 0]), [-3.9, 3.9], atol=1.0)
+    np.testing.assert_allclose(np.sort(found[:, 0]), [-3.9, 3.9], rtol=0.0, atol=1.0)
 
 
 TAPER = 1.6 * np.clip((MIDDLE - Z) / 10.0, -0.5, 1.0)
