@@ -16,6 +16,7 @@ from pipeline.segment import bone, uneven
 from pipeline.segment.config import SegmentConfig
 from pipeline.segment.contact import contacts, warning
 from pipeline.segment.cut_off import cut_off
+from pipeline.segment.ends import ends
 from pipeline.segment.fuzzy import fuzzy_region
 from pipeline.segment.layered import layer_around, surrounded, with_layer_alone
 from pipeline.segment.levels import Region, brighter, scanner_blur
@@ -99,8 +100,9 @@ def segment(
     volume : grey values, brighter inside the vessel.  seeds_mm : (m, 3) LPS mm, points inside it.  wire_radius_mm : of
     the wire, where the scan shows one: seeds may lie on it.
     Returns a Lumen whose distance is float32 mm, negative inside, on the vessel's own box; exact to
-    ``config.outer_mm`` outside; its warnings name places where two vessels have merged. Raises StageError
-    (SEGMENT_FAILED) when the seeds lie in no bright vessel. The wall is the half-level surface, blur corrected.
+    ``config.outer_mm`` outside; its warnings name places where two vessels have merged, or one goes on beyond its end.
+    Raises StageError (SEGMENT_FAILED) when the seeds lie in no bright vessel. The wall is the half-level surface, blur
+    corrected.
     """
     config = config or SegmentConfig()
     scan, axes = in_memory_order(volume)
@@ -121,6 +123,7 @@ def segment(
     box = wall.values, site.corner
     said += add_necks(region.necks, box, grid, region.levels, blur)
     said += add_necks(closed_necks(*box, grid, config.least_voxels), box, grid, region.levels, blur)
+    said += ends(grid, found.distance, site.corner, wall.levels, wall.wall, region.taps)
     return Lumen(
         reorder(found.distance, axes), wall.levels.half, said,
         {**region.counters, **wall.counters, "touching_places": float(len(open_ones))},

@@ -57,7 +57,7 @@ def _shell(flat: Index, grid: Grid) -> Index:
     return np.asarray(flat[shell(boxed(flat, grid))])
 
 
-def _runs_along(points: Array, end: Array, heading: Array) -> bool:
+def runs_along(points: Array, end: Array, heading: Array) -> bool:
     """Whether a vessel, voxels (n, 3), extends further along a heading (3,) than across it, near its ``end`` (3,)."""
     near = points[np.linalg.norm(points - end, axis=1) < WINDOW]
     spread = np.cov(near.T)
@@ -186,7 +186,7 @@ def _ahead(grid: Grid, here: tuple[Array, Array], there: tuple[Array, Array]) ->
     """The axis of a neck between two parts, each voxels (n, 3) and its end (3,); None where they are not in line."""
     start, stop = _middle(*here), _middle(*there)
     heading = (stop - start) / np.linalg.norm(stop - start)
-    on = _runs_along(*here, heading) and _runs_along(*there, heading)
+    on = runs_along(*here, heading) and runs_along(*there, heading)
     return _axis(grid, start, stop) if on else None
 
 
