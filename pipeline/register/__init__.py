@@ -15,7 +15,7 @@ from pipeline.model import Array, Lumen, Volume
 from pipeline.register.bent import Bent, bent
 from pipeline.register.patches import LEAST_MM, SPAN_RADII
 from pipeline.register.rigid import Motion, edge_mask, rigid
-from pipeline.register.shift import StaticPoints, farthest, fit_motion, look, static_points
+from pipeline.register.shift import Fit, StaticPoints, farthest, fit_motion, look, static_points
 from pipeline.register.slide import hidden, slid
 from solver.grid import Grid
 
@@ -138,6 +138,12 @@ def _best(frame: Volume, to: Anchor) -> Motion:
     return near.motion if near.misfit_voxels < CLEARLY * far.misfit_voxels else far.motion
 
 
+def _still(wall: StaticPoints, fit: Fit, moved: float) -> Registration:
+    """A motion that is too small to be applied."""
+    rest = bent(wall, fit.last, taken=True)
+    return Registration(moved_voxels=moved, left_voxels=moved, misfit_voxels=fit.misfit_voxels, bent=rest)
+
+
 def register(frame: Volume, to: Anchor, skip_voxels: float) -> Registration:
     """Where the phantom lies in ``frame`` (on the reference's lattice).
 
@@ -150,8 +156,7 @@ def register(frame: Volume, to: Anchor, skip_voxels: float) -> Registration:
     first, _ = look(frame, wall, Motion(), skip_voxels)
     moved = farthest(first.motion, wall)
     if moved < skip_voxels and first.misfit_voxels < BAD_MISFIT_VOXELS:
-        rest = bent(wall, first.last, taken=True)
-        return Registration(moved_voxels=moved, left_voxels=moved, misfit_voxels=first.misfit_voxels, bent=rest)
+        return _still(wall, first, moved)
     motion, structures = _best(frame, to), to.structures.in_one
     if look(frame, wall, motion)[1]:
         structures = to.structures
@@ -161,5 +166,7 @@ def register(frame: Volume, to: Anchor, skip_voxels: float) -> Registration:
     left = farthest(last.motion.after(motion), wall)
     if last.misfit_voxels > BAD_MISFIT_VOXELS:
         return Registration(moved_voxels=moved, left_voxels=left, misfit_voxels=last.misfit_voxels)
+    if (far := farthest(motion, wall)) < skip_voxels:
+        return _still(wall, look(frame, wall, Motion())[0], far)
     shift, loose_mm, rest = motion.displacement_mm(wall.centre_mm), loose * wall.voxel_mm, bent(wall, last.last)
-    return Registration(motion, True, farthest(motion, wall), left, last.misfit_voxels, shift, loose_mm, rest)
+    return Registration(motion, True, far, left, last.misfit_voxels, shift, loose_mm, rest)

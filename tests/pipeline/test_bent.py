@@ -55,7 +55,10 @@ def phantom(request: pytest.FixtureRequest) -> tuple[int, Lumen, Anchor]:
 
 
 def bend(size_mm: float) -> Move:
-    return lambda points: points + size_mm * np.exp(-((points[:, 2:] - 15.0) ** 2) / 50.0) * [1.0, 0.0, 0.0]
+    def bent(points: np.ndarray) -> np.ndarray:
+        return np.asarray(points + np.exp(-((points[:, 2:] - 15.0) ** 2) / 50.0) * [size_mm, 0.0, 0.0])
+
+    return bent
 
 
 def turned(voxels: float, degrees: float, seed: int) -> Motion:
