@@ -44,9 +44,9 @@ MOST_SEEN = 0.8
 """Share of the points that a motion must leave inside the scan."""
 UNSEEN_VOXELS = 0.03
 """A motion known no better than this (sd) counts as none: a straight tube does not show that it slid along itself."""
-VARIED = 0.85
+VARIED = 0.7
 """Misfit with a gain of each patch's own, over that with one, from which the gain varies: where it went from 0.8 to
-1.25 along 28 mm, 0.3 to 0.7; where it did not, 0.9 to 1, in noise that is correlated, too."""
+1.25 along 28 mm, 0.3 to 0.7; where it did not, 0.9 to 1 in noise, white or correlated, and 0.74 where there is none."""
 REWEIGHTS = 5
 """Times that the weights against metal are worked out anew; from the third on nothing changes by a tenth."""
 ROUNDS = 12

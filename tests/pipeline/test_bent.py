@@ -74,7 +74,7 @@ def across(off: np.ndarray, curve: np.ndarray) -> np.ndarray:
     """Length (n,) of displacements (n, 3) at points of a curve, but for what runs along it."""
     along = np.gradient(curve, axis=0)
     along /= np.linalg.norm(along, axis=1)[:, None]
-    return np.linalg.norm(off - along * np.sum(off * along, axis=1)[:, None], axis=1)
+    return np.asarray(np.linalg.norm(off - along * np.sum(off * along, axis=1)[:, None], axis=1))
 
 
 def warnings_of(found: Registration, lumen: Lumen, to: Anchor) -> list[str]:
