@@ -12,8 +12,10 @@ from numpy.typing import NDArray
 
 from pipeline.arrays.grids import unflattened
 from pipeline.model import Array, Lumen, Volume
+from pipeline.register.bent import Bent, bent
+from pipeline.register.patches import LEAST_MM, SPAN_RADII
 from pipeline.register.rigid import Motion, edge_mask, rigid
-from pipeline.register.shift import StaticPoints, fit_motion, static_points
+from pipeline.register.shift import Fit, StaticPoints, farthest, fit_motion, look, static_points
 from pipeline.register.slide import hidden, slid
 from solver.grid import Grid
 
@@ -44,6 +46,7 @@ class Anchor:
 
     reference: Volume
     wall: StaticPoints
+    patch_mm: float
 
     @cached_property
     def hides(self) -> bool:
@@ -58,7 +61,7 @@ class Anchor:
     @cached_property
     def structures(self) -> StaticPoints:
         """Points on walls and bones, for the fit of a frame that moved."""
-        return static_points(self.reference, _thinned(self.reference, self.edges, STRUCTURE_POINTS))
+        return static_points(self.reference, _thinned(self.reference, self.edges, STRUCTURE_POINTS), self.patch_mm)
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,6 +81,7 @@ class Registration:
     misfit_voxels: float = 0.0
     centre_shift_mm: Array = field(default_factory=lambda: np.zeros(3))
     loose_mm: float = 0.0
+    bent: Bent = field(default_factory=Bent)
 
     @property
     def trusted(self) -> bool:
@@ -119,22 +123,25 @@ def anchor(reference: Volume, lumen: Lumen) -> Anchor:
     distance = lumen.distance
     reach = BAND_VOXELS * float(np.min(distance.spacing_mm))
     band = (distance.values < reach) & (distance.values > -reach)  # without a second box of numbers
-    return Anchor(reference, static_points(reference, _thinned(distance, band, POINTS)))
-
-
-def _largest(motion: Motion, s: StaticPoints) -> float:
-    """Largest displacement of a point, voxels."""
-    return float(np.linalg.norm(motion.displacement_mm(s.points_mm), axis=1).max(initial=0.0)) / s.voxel_mm
+    patch_mm = max(LEAST_MM, -SPAN_RADII * float(distance.values.min()))
+    return Anchor(reference, static_points(reference, _thinned(distance, band, POINTS), patch_mm), patch_mm)
 
 
 def _best(frame: Volume, to: Anchor) -> Motion:
     """The motion by least squares, which starts from SimpleITK's result where the motion is too large for it alone."""
-    near = fit_motion(frame, to.structures)
-    if near.misfit_voxels < BAD_MISFIT_VOXELS and _largest(near.motion, to.wall) < NEAR_VOXELS:
+    structures = to.structures.in_one
+    near = fit_motion(frame, structures)
+    if near.misfit_voxels < BAD_MISFIT_VOXELS and farthest(near.motion, to.wall) < NEAR_VOXELS:
         return near.motion
     rough = rigid(frame, to.reference, to.edges, to.wall.centre_mm)
-    far = fit_motion(frame, to.structures, rough)
+    far = fit_motion(frame, structures, rough)
     return near.motion if near.misfit_voxels < CLEARLY * far.misfit_voxels else far.motion
+
+
+def _still(wall: StaticPoints, fit: Fit, moved: float) -> Registration:
+    """A motion that is too small to be applied."""
+    rest = bent(wall, fit.last, taken=True)
+    return Registration(moved_voxels=moved, left_voxels=moved, misfit_voxels=fit.misfit_voxels, bent=rest)
 
 
 def register(frame: Volume, to: Anchor, skip_voxels: float) -> Registration:
@@ -146,15 +153,20 @@ def register(frame: Volume, to: Anchor, skip_voxels: float) -> Registration:
     wall = to.wall
     if len(wall.points_mm) < LEAST_POINTS:
         return Registration(misfit_voxels=float("inf"))
-    look = fit_motion(frame, wall, rounds=1)
-    moved = _largest(look.motion, wall)
-    if moved < skip_voxels and look.misfit_voxels < BAD_MISFIT_VOXELS:
-        return Registration(moved_voxels=moved, left_voxels=moved, misfit_voxels=look.misfit_voxels)
-    motion, loose = slid(frame, to.structures, _best(frame, to))
-    last = fit_motion(frame, wall, motion, rounds=1)
-    left = _largest(last.motion.after(motion), wall)
+    first, _ = look(frame, wall, Motion(), skip_voxels)
+    moved = farthest(first.motion, wall)
+    if moved < skip_voxels and first.misfit_voxels < BAD_MISFIT_VOXELS:
+        return _still(wall, first, moved)
+    motion, structures = _best(frame, to), to.structures.in_one
+    if look(frame, wall, motion)[1]:
+        structures = to.structures
+        motion = fit_motion(frame, structures, motion).motion
+    motion, loose = slid(frame, structures, motion)
+    last, _ = look(frame, wall, motion)
+    left = farthest(last.motion.after(motion), wall)
     if last.misfit_voxels > BAD_MISFIT_VOXELS:
         return Registration(moved_voxels=moved, left_voxels=left, misfit_voxels=last.misfit_voxels)
-    shift = motion.displacement_mm(wall.centre_mm)
-    loose_mm = loose * wall.voxel_mm
-    return Registration(motion, True, _largest(motion, wall), left, last.misfit_voxels, shift, loose_mm)
+    if (far := farthest(motion, wall)) < skip_voxels:
+        return _still(wall, look(frame, wall, Motion())[0], far)
+    shift, loose_mm, rest = motion.displacement_mm(wall.centre_mm), loose * wall.voxel_mm, bent(wall, last.last)
+    return Registration(motion, True, far, left, last.misfit_voxels, shift, loose_mm, rest)

@@ -1,11 +1,14 @@
 """Puts frames back into their place: finds the phantom's motion, corrects the geometry, and reports both."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from pipeline.arrays.grids import sampled
-from pipeline.model import Lumen, Volume
+from pipeline.model import Curve, Lumen, Volume
 from pipeline.register import Anchor, Registration, anchor, register
+from pipeline.register.bent import Bent
 from pipeline.register.rigid import Motion
 
 HIDES = (
@@ -83,7 +86,31 @@ def sentences_of(alignment: Alignment, found: Mapping[int, Registration | None])
         )
     if alignment.anchor.hides and known:
         texts.append(HIDES)
-    return texts, [f"frame {n}: {r.sentence}" for n, r in known if not r.trusted or (r.applied and r.doubt)]
+    doubtful = [f"frame {n}: {r.sentence}" for n, r in known if not r.trusted or (r.applied and r.doubt)]
+    return texts, doubtful + _bent([(n, r.bent) for n, r in known if r.bent.told])
+
+
+def _bent(found: Sequence[tuple[int, Bent]]) -> list[str]:
+    """A warning where the wall of frames (number, what is left) lies where no rigid motion takes it."""
+    if not found:
+        return []
+    number, worst = max(found, key=lambda pair: pair[1].rms_voxels)
+    place = ", ".join(f"{x:.1f}" for x in worst.worst_mm)
+    return [
+        f"frame{'s' * (len(found) > 1)} {', '.join(str(n) for n, _ in found)}: the vessel's wall fits no rigid motion "
+        f"of the phantom, up to {worst.rms_voxels:.2f} voxel rms are left (frame {number}, {worst.most_voxels:.2f} at "
+        f"LPS mm ({place})): it is soft and bends, or the wire pushes it aside; traces may lie beside the lumen by as "
+        "much, which trace_sigma_mm includes; hold the vessel in place all along, and scan it anew"
+    ]
+
+
+def widened(curve: Curve, found: Registration | None) -> Curve:
+    """The curve, less sure by what no rigid motion of the phantom explains of the wall beside it."""
+    if found is None or not found.bent.told or not len(curve.points_mm):
+        return curve
+    more = found.bent.off_mm(curve.points_mm) / np.sqrt(2.0)  # per axis: a wall's shift along the vessel does not show
+    sigma, tip = np.hypot(curve.sigma_mm, more), float(np.hypot(np.nan_to_num(curve.tip_sigma_mm), more[-1]))
+    return replace(curve, sigma_mm=sigma, tip_sigma_mm=tip)
 
 
 def record(found: Registration | None) -> dict[str, object] | None:
@@ -92,4 +119,5 @@ def record(found: Registration | None) -> dict[str, object] | None:
         return None
     names = ("applied", "moved_voxels", "left_voxels", "centre_shift_mm")
     motion = {name: getattr(found.motion, name) for name in ("angle_deg", "rotation", "shift_mm")}
-    return {name: getattr(found, name) for name in names} | motion
+    bent = {"bent_rms_voxels": found.bent.rms_voxels, "bent_most_voxels": found.bent.most_voxels}
+    return {name: getattr(found, name) for name in names} | bent | motion

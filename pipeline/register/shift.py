@@ -4,7 +4,9 @@ A wall that moves by d changes grey by -gradient . d there. Values and gradients
 taken at a few thousand points alone, so that noise falls to 0.15 and nothing is interpolated.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +15,7 @@ from scipy.spatial import cKDTree
 from pipeline.arrays.grids import MAD, in_memory_order, unflattened
 from pipeline.arrays.jets import Blurred, jets_at, values_at
 from pipeline.model import Array, Volume
+from pipeline.register.patches import means, parted, products, shaded, spread_out
 from pipeline.register.rigid import Motion
 
 BLUR_VOXELS = 1.0
@@ -41,6 +44,9 @@ MOST_SEEN = 0.8
 """Share of the points that a motion must leave inside the scan."""
 UNSEEN_VOXELS = 0.03
 """A motion known no better than this (sd) counts as none: a straight tube does not show that it slid along itself."""
+VARIED = 0.7
+"""Misfit with a gain of each patch's own, over that with one, from which the gain varies: where it went from 0.8 to
+1.25 along 28 mm, 0.3 to 0.7; where it did not, 0.9 to 1 in noise, white or correlated, and 0.74 where there is none."""
 REWEIGHTS = 5
 """Times that the weights against metal are worked out anew; from the third on nothing changes by a tenth."""
 ROUNDS = 12
@@ -53,7 +59,7 @@ STILL_VOXELS = 0.002
 class StaticPoints:
     """Points (n, 3) LPS mm on structures that do not move against each other, with the reference's blurred grey (n,)
     and its gradient (n, 3) per mm; blur_mm : of both; voxel_mm : the unit in which motion is judged; noise : standard
-    deviation of each of the gradient's components by noise alone.
+    deviation of each of the gradient's components by noise alone; starts : first point of each patch (see ``patches``).
     """
 
     points_mm: Array
@@ -62,13 +68,29 @@ class StaticPoints:
     blur_mm: float
     voxel_mm: float
     noise: float
+    starts: NDArray[np.intp]
 
-    @property
+    @cached_property
+    def centred(self) -> Array:
+        """Grey (n,) less that of each point's patch at the mean."""
+        return np.asarray(self.grey - spread_out(means(self.grey, self.starts), self.starts, len(self.grey)))
+
+    def shade(self, of_patches: Array) -> Array:
+        """The grey (n,) of the patches' offsets and gains (k, 2)."""
+        offset, gain = spread_out(of_patches, self.starts, len(self.grey)).T
+        return np.asarray(offset + gain * self.centred)
+
+    @cached_property
+    def in_one(self) -> "StaticPoints":
+        """The same points in one patch: one gain for all of the scan, which noise disturbs least."""
+        return replace(self, starts=np.zeros(1, np.intp))
+
+    @cached_property
     def centre_mm(self) -> Array:
         """Centroid (3,)."""
         return np.asarray(self.points_mm.mean(axis=0))
 
-    @property
+    @cached_property
     def radius_mm(self) -> float:
         """Root mean square distance from the centroid: what turns an angle into a displacement."""
         return float(np.sqrt(np.mean(np.sum((self.points_mm - self.centre_mm) ** 2, axis=1))))
@@ -78,18 +100,35 @@ class StaticPoints:
         """The radius, by which turns are made shifts; that of one point is a voxel."""
         return max(self.radius_mm, self.voxel_mm)
 
-    @property
+    @cached_property
     def steepness(self) -> float:
         """Root mean square gradient, per mm."""
         return float(np.sqrt(np.mean(np.sum(self.gradient**2, axis=1))))
 
 
+class Solved(NamedTuple):
+    """Amounts (6,) of motion (see ``changes``) and the change of grey (n,) by them; each patch's gain (k,); what is
+    left, ``rest`` (n,), and its scale (sd); clear : points (n,) away from metal.
+    """
+
+    amounts: Array
+    change: Array
+    gains: Array
+    rest: Array
+    scale: float
+    clear: NDArray[np.bool_]
+
+
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """A motion and how well it explains the frame: misfit_voxels is the residual as an uncertainty of one point."""
+    """A motion and how well it explains the frame: misfit_voxels is the residual as an uncertainty of one point.
+
+    last : the last step, which the motion holds; None where the motion leaves too little inside the scan.
+    """
 
     motion: Motion
     misfit_voxels: float
+    last: Solved | None = None
 
 
 def inside(scan: Volume, points_mm: Array) -> NDArray[np.bool_]:
@@ -98,9 +137,11 @@ def inside(scan: Volume, points_mm: Array) -> NDArray[np.bool_]:
     return np.asarray(np.all((index > BORDER_VOXELS) & (index < np.array(scan.shape) - 1 - BORDER_VOXELS), axis=1))
 
 
-def static_points(reference: Volume, points_mm: Array) -> StaticPoints:
-    """Read the reference at the points (n, 3) that lie well inside it."""
-    points = np.ascontiguousarray(points_mm[inside(reference, points_mm)])
+def static_points(reference: Volume, points_mm: Array, patch_mm: float) -> StaticPoints:
+    """Read the reference at the points (n, 3) that lie well inside it; patch_mm : extent of two patches."""
+    points = points_mm[inside(reference, points_mm)]
+    order, starts = parted(points, patch_mm)
+    points = np.ascontiguousarray(points[order])
     grid, _ = in_memory_order(reference)
     voxel = float(np.min(grid.spacing_mm))
     field = Blurred(grid.values, grid.spacing_mm, BLUR_VOXELS * voxel)
@@ -109,36 +150,30 @@ def static_points(reference: Volume, points_mm: Array) -> StaticPoints:
     steep = np.sum(jets_at(field, anywhere * grid.spacing_mm)[:, 1:4] ** 2, axis=1)
     steep = steep[steep > 1e-12 * max(float(steep.max()), 1e-12)]  # not the padding around what was reconstructed
     noise = float(np.sqrt(np.quantile(steep, FLAT) / OF_FLAT)) if len(steep) else 0.0
-    return StaticPoints(points, jets[:, 0], jets[:, 1:4] @ grid.direction.T, BLUR_VOXELS * voxel, voxel, noise)
+    return StaticPoints(points, jets[:, 0], jets[:, 1:4] @ grid.direction.T, BLUR_VOXELS * voxel, voxel, noise, starts)
 
 
-def _seen(normal: Array, right: Array, scale: float, noise: float) -> Array:
-    """Solve the 8 normal equations; of the six motions, those that the structures do not show stay zero.
-
-    noise : of a gradient's component, per voxel.
-    """
-    a, b, c = normal[:6, :6], normal[:6, 6:], normal[6:, 6:]
-    to_grey = np.linalg.solve(c, np.column_stack([b.T, right[6:]]))
-    power, axes = np.linalg.eigh(a - b @ to_grey[:, :6])
-    shown = power > max((scale / UNSEEN_VOXELS) ** 2, ABOVE_NOISE * normal[7, 7] * noise**2, 1e-9 * power[-1])
-    amounts = np.where(shown, axes.T @ (right[:6] - b @ to_grey[:, 6]) / np.where(shown, power, 1.0), 0.0)
-    motion = axes @ amounts
-    return np.concatenate([motion, to_grey[:, 6] - to_grey[:, :6] @ motion])
+def _seen(normal: Array, right: Array, least: float) -> Array:
+    """Solve the normal equations of six motions; those that the structures do not show, below ``least``, stay zero."""
+    power, axes = np.linalg.eigh(normal)
+    shown = power > max(least, 1e-9 * power[-1])
+    return np.asarray(axes @ np.where(shown, axes.T @ right / np.where(shown, power, 1.0), 0.0))
 
 
-def _reweighted(design: Array, grey: Array, used: NDArray[np.bool_], noise: float) -> tuple[Array, float, Array]:
-    """Robust solution of design @ x = grey, its scale (sd) and all residuals; points not ``used`` have no say.
-
-    noise : see ``_seen``.
-    """
-    weights, solution, scale, residual = used.astype(float), np.zeros(8), 0.0, grey
+def _reweighted(s: StaticPoints, design: Array, grey: Array, used: NDArray[np.bool_]) -> Solved:
+    """Robust solution of design @ x = grey, but for each patch's gain and offset; points not ``used`` have no say."""
+    weights, scale = used.astype(float), 0.0
+    rows = np.column_stack([design, np.ones(len(grey)), s.centred, grey])
     for _ in range(REWEIGHTS):
-        weighted = design * weights[:, None]
-        solution = _seen(weighted.T @ design, weighted.T @ grey, scale, noise)
-        residual = grey - design @ solution
+        normal, right, shade = shaded(products(rows, weights, s.starts))
+        noise = ABOVE_NOISE * float(weights.sum()) * (s.voxel_mm * s.noise) ** 2
+        solution = _seen(normal.sum(axis=0), right.sum(axis=0), max((scale / UNSEEN_VOXELS) ** 2, noise))
+        shades = shade @ np.append(-solution, 1.0)
+        change = design @ solution
+        residual = grey - change - s.shade(shades)
         scale = MAD * float(np.median(np.abs(residual[used]))) + 1e-9
         weights = used * np.clip(1.0 - (residual / (TUKEY * scale)) ** 2, 0.0, None) ** 2
-    return solution, scale, residual
+    return Solved(solution, change, shades[:, 1], residual, scale, used)
 
 
 def near_metal(points_mm: Array, metal: NDArray[np.bool_], reach_mm: float) -> NDArray[np.bool_]:
@@ -168,21 +203,43 @@ def grey_at(frame: Volume, s: StaticPoints, at_mm: Array) -> Array:
     return values_at(Blurred(grid.values, grid.spacing_mm, s.blur_mm), grid.to_index(at_mm) * grid.spacing_mm)
 
 
-def _step(s: StaticPoints, at_mm: Array, grey: Array, motion: Motion) -> tuple[Array, float]:
-    """The six amounts (voxels, see ``changes``) of motion that the residuals ask for, and the misfit.
+def _step(s: StaticPoints, at_mm: Array, grey: Array, motion: Motion) -> Fit:
+    """The motion and what the residuals ask for, and the misfit.
 
-    Unknowns also hold a gain and an offset of grey, since contrast drifts between scans. The misfit is infinite where
-    the gain says that there is no such wall here.
+    Unknowns also hold each patch's gain and offset of grey, since contrast drifts between scans, and within one. The
+    misfit is infinite where the gains say that there is no such wall here.
     """
-    h = s.voxel_mm
-    design = np.column_stack([changes(s, at_mm, motion), s.grey - s.grey.mean(), np.ones(len(grey))])
-    slope = h * s.steepness
-    solution, scale, residual = _reweighted(design, grey, np.ones(len(grey), bool), h * s.noise)
-    clear = ~near_metal(s.points_mm, residual > METAL_SCALES * scale, METAL_VOXELS * h)
+    h, design = s.voxel_mm, changes(s, at_mm, motion)
+    found = _reweighted(s, design, grey, np.ones(len(grey), bool))
+    clear = ~near_metal(s.points_mm, found.rest > METAL_SCALES * found.scale, METAL_VOXELS * h)
     if MOST_METAL * len(grey) < np.count_nonzero(clear) < len(grey):
-        solution, scale, _ = _reweighted(design, grey, clear, h * s.noise)
-    shown = LEAST_GAIN < solution[6] < 1.0 / LEAST_GAIN
-    return solution[:6], scale / max(slope, 1e-9) if shown else float("inf")
+        found = _reweighted(s, design, grey, clear)
+    shown = LEAST_GAIN < np.median(found.gains) < 1.0 / LEAST_GAIN
+    misfit = found.scale / max(h * s.steepness, 1e-9) if shown else float("inf")
+    return Fit(moved_by(motion, s, found.amounts), misfit, found._replace(clear=clear))
+
+
+def look(frame: Volume, s: StaticPoints, motion: Motion, enough: float = 0.0) -> tuple[Fit, bool]:
+    """One step from ``motion`` on, and whether it is with gains of the patches' own.
+
+    One gain is the less disturbed by noise: patches have their own where it does not explain the frame. enough : a
+    step that moves no point by so much (voxels) is believed at one gain.
+    """
+    at = motion.moved(s.points_mm)
+    if np.mean(inside(frame, at)) < MOST_SEEN:
+        return Fit(motion, float("inf")), False
+    grey = grey_at(frame, s, at)
+    one = _step(s.in_one, at, grey, motion)
+    if np.isfinite(one.misfit_voxels) and farthest(one.motion.after(motion), s) < enough:
+        return one, False
+    own = _step(s, at, grey, motion)
+    varied = own.misfit_voxels < VARIED * one.misfit_voxels
+    return (own if varied else one), varied
+
+
+def farthest(motion: Motion, s: StaticPoints) -> float:
+    """Largest displacement of a point, voxels."""
+    return float(np.linalg.norm(motion.displacement_mm(s.points_mm), axis=1).max(initial=0.0)) / s.voxel_mm
 
 
 def fit_motion(frame: Volume, s: StaticPoints, start: Motion | None = None, rounds: int = ROUNDS) -> Fit:
@@ -190,13 +247,13 @@ def fit_motion(frame: Volume, s: StaticPoints, start: Motion | None = None, roun
 
     Good for motions below the width of a blurred wall, about 1.5 voxels; metal is outvoted.
     """
-    motion, misfit = start or Motion(), float("inf")
+    fit = Fit(start or Motion(), float("inf"))
     for _ in range(rounds):
-        at = motion.moved(s.points_mm)
+        at = fit.motion.moved(s.points_mm)
         if np.mean(inside(frame, at)) < MOST_SEEN:
-            return Fit(motion, float("inf"))
-        step, misfit = _step(s, at, grey_at(frame, s, at), motion)
-        motion = moved_by(motion, s, step)
-        if np.linalg.norm(step[:3]) + np.linalg.norm(step[3:]) < STILL_VOXELS:
+            return Fit(fit.motion, float("inf"))
+        fit = _step(s, at, grey_at(frame, s, at), fit.motion)
+        assert fit.last is not None
+        if np.linalg.norm(fit.last.amounts[:3]) + np.linalg.norm(fit.last.amounts[3:]) < STILL_VOXELS:
             break
-    return Fit(motion, misfit)
+    return fit

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from pipeline.arrays.grids import spread
 from pipeline.model import Array, Volume
+from pipeline.register.patches import products, shaded
 from pipeline.register.rigid import Motion
 from pipeline.register.shift import (
     ABOVE_NOISE,
@@ -105,9 +106,9 @@ def _best_along(frame: Volume, s: StaticPoints, motion: Motion, axis: Array) -> 
 
 
 def _rest(frame: Volume, s: StaticPoints, motion: Motion, seen: NDArray[np.bool_]) -> Array:
-    """The frame's blurred grey at the moved points that are ``seen``, less the reference's in its gain."""
-    at, here = np.ascontiguousarray(motion.moved(s.points_mm)[seen]), s.grey[seen]
-    grey = grey_at(frame, s, at)
-    gain, offset = np.polyfit(here, grey, 1)
-    rest = grey - gain * here - offset
+    """The frame's blurred grey at the moved points that are ``seen``, less the reference's in its patches' gains."""
+    grey = grey_at(frame, s, motion.moved(s.points_mm))
+    rows = np.column_stack([np.ones(len(grey)), s.centred, grey])
+    _, _, shade = shaded(products(rows, seen.astype(float), s.starts))
+    rest = (grey - s.shade(shade[:, :, 0]))[seen]
     return np.asarray(rest - np.median(rest))

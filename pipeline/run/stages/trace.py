@@ -11,7 +11,7 @@ from pipeline.arrays.grids import corners_mm
 from pipeline.load import Crop, Header
 from pipeline.model import Curve, Volume
 from pipeline.register import Motion
-from pipeline.register.frames import Alignment, alignment_of, counters_of, put_in_place, sentences_of
+from pipeline.register.frames import Alignment, alignment_of, counters_of, put_in_place, sentences_of, widened
 from pipeline.run.helpers import Earlier
 from pipeline.run.log import Log
 from pipeline.run.projections import grey_window, projections
@@ -161,7 +161,7 @@ class _Tracing:
             here, shown, registration = put_in_place(volume, self.alignment, read_moved)
         log.count("trace", counters_of(registration))
         frame = replace(frame, registration=registration, voxels=known_by(volume))
-        seen = self.follow(run, frame, here, earlier)
+        seen = widened(self.follow(run, frame, here, earlier), registration)
         done = _of_scan(run, frame, seen)
         if self.given:
             done = as_given(run, frame, self.given[frame.index], self.lumen.distance)
