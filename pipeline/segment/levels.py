@@ -118,7 +118,8 @@ def levels_at(grid: Grid, index: NDArray[Any]) -> tuple[GreyLevels, NDArray[np.i
     inside, outside, region = _two_levels(grey, seed, at)
     found = start + np.array(at)
     noise = voxel_noise(raw - grey, region)
-    return GreyLevels(inside, outside, noise, noise_left(raw, region, noise), tuple(found.tolist()), inside), found
+    left = noise_left(raw, region, grey > 0.5 * (inside + outside), noise)
+    return GreyLevels(inside, outside, noise, left, tuple(found.tolist()), inside), found
 
 
 def scanner_blur(blur_mm: float, taps: NDArray[Any], voxel: float) -> float:

@@ -44,15 +44,20 @@ def voxel_noise(rough: NDArray[Any], region: NDArray[np.bool_]) -> float:
     return spread(rough[core] if core.any() else rough.ravel()) / SHARP
 
 
-def noise_left(grey: NDArray[Any], region: NDArray[np.bool_], noise: float) -> tuple[float, ...]:
+def noise_left(
+    grey: NDArray[Any], region: NDArray[np.bool_], bright: NDArray[np.bool_], noise: float
+) -> tuple[float, ...]:
     """Standard deviation of the noise around the region, in ``grey`` smoothed by 1-2-1 not at all, once and twice.
 
-    What is wider than ten voxels or so is tissue, not noise; the darkest grey is padding. noise : of a voxel beside the
-    next, which is taken for white where there is no room to tell.
+    What is wider than ten voxels or so is tissue, not noise; the darkest grey is padding. bright : what is as bright as
+    the region, itself and others. noise : of a voxel beside the next, taken for white where there is no room to tell.
     """
     shown = grey > grey.min()
-    outside = shown & ~ndimage.binary_dilation(region, iterations=CLEAR)
-    if np.count_nonzero(outside) < LEAST:
+    for full in (ndimage.binary_opening(bright), region):  # other vessels and bone too, where that leaves room
+        outside = shown & ~ndimage.binary_dilation(full, iterations=CLEAR)
+        if np.count_nonzero(outside) >= LEAST:
+            break
+    else:
         outside = ndimage.binary_erosion(region, iterations=CLEAR)
     if np.count_nonzero(outside) < LEAST:
         return tuple(share * noise for share in WHITE)
