@@ -90,15 +90,15 @@ def read_results(out: str | Path) -> Results:
     out = Path(out)
     if not out.is_dir():
         raise InputError([f"{out}: no such folder; give one that `wireval run` wrote"])
-    damaged = {one.case: one.failures[0]["message"] for one in found_results(out) if one.status == "damaged"}
-    for message in damaged.values():
-        warnings.warn(f"{message}; its errors are left out", stacklevel=2)
     try:
         cases = {folder.name: read_case(folder, points=False) for folder in find_cases(out)}
     except ValueError as error:
         raise InputError([str(error)]) from None
     if not cases:
         raise InputError([f"{out}: no cases below it; give a folder that `wireval run` wrote"])
+    damaged = {one.case: one.failures[0]["message"] for one in found_results(out) if one.status == "damaged"}
+    for message in damaged.values():
+        warnings.warn(f"{message}; its errors are left out", stacklevel=2)
     return _results(out, cases, tuple(damaged))
 
 
