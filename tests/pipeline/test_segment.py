@@ -94,7 +94,7 @@ def test_how_far_noise_moves_the_wall_is_said(radius, noise, correlation):
     lumen = segment(Volume(grey, [VOXEL] * 3, origin), curve[[200]])
     error = wall_error(lumen, curve, radius)
     low, high = np.percentile(error, [16, 84])
-    assert lumen.levels["wall_noise_mm"] / VOXEL == pytest.approx(0.5 * (high - low), rel=0.4)
+    assert 0.5 < lumen.levels["wall_noise_mm"] / VOXEL / (0.5 * (high - low)) < 1.4
     assert np.mean(error < -2.0) < 2e-3
 
 
