@@ -158,12 +158,20 @@ def _to_the_edge(case: Case, header: Header, sign: float) -> float:
         return float(max(0.0, np.nanmin(np.where(step != 0.0, (limit - start) / step, np.inf))))
 
 
+def other_voxels(header: Header | None) -> list[str]:
+    """A sentence where the manifest's ``spacing_mm`` stands in for another one that a scan states."""
+    notes = () if header is None else header.assumed
+    if any("lacks spacing" in note for note in notes):  # that is what the key is for
+        return []
+    return [f"spacing_mm: {note}; is that meant?" for note in notes if "where the file has" in note]
+
+
 def doubts(cases: Sequence[Case], config: Config) -> Iterator[str]:
     """All that is doubtful in a study, by its manifest and the headers of its scans, a sentence each."""
     yield from implausible(cases)
     for case in cases:
         scan = first_of(case, config)
-        said = [*leads_out(case, scan), *odd_depths(case, scan), *wrapped_rolls(case)]
+        said = [*other_voxels(scan), *leads_out(case, scan), *odd_depths(case, scan), *wrapped_rolls(case)]
         said += odd_truth(case, read_truth(case.truth, None)) if case.truth else []
         yield from (f"case {case.id!r}: {text}" for text in said)
     yield from shared(cases)

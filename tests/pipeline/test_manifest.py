@@ -11,12 +11,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.load import Header, LoadError, Source
+from pipeline.load import Header, LoadError, Source, read_header
 from pipeline.load.curves import read_truth
 from pipeline.load.order import natural_key
 from pipeline.model import Array
 from pipeline.study.manifest import ManifestError, read_manifest
-from pipeline.study.plausible import implausible, measured_otherwise, odd_depths, odd_truth, wrapped_rolls
+from pipeline.study.plausible import implausible, measured_otherwise, odd_depths, odd_truth, other_voxels, wrapped_rolls
 from pipeline.study.same_scans import continued
 from pipeline.study.settings import Config
 
@@ -261,3 +261,16 @@ def test_a_truth_of_one_point_is_none(tmp_path: Path) -> None:
     path.write_text(json.dumps({"frames": [{"points_mm": [[0.0, 0.0, 0.0]] * 10}]}), encoding="utf-8")
     with pytest.raises(LoadError, match="frame 0 holds 1 points; expected two or more, apart"):
         read_truth(path, 1)
+
+
+@pytest.mark.parametrize(("spacing", "said"), [("ElementSpacing = 0.5 0.5 0.5\n", True), ("", False)])
+def test_another_voxel_size_than_the_scan_states_is_doubted(tmp_path: Path, spacing: str, said: bool) -> None:
+    """5 mm in place of 0.5 was an assumption, and a study of slices."""
+    path = tmp_path / "scan.mha"
+    head = (
+        f"ObjectType = Image\nNDims = 3\nDimSize = 8 8 8\n{spacing}ElementType = MET_SHORT\nElementDataFile = LOCAL\n"
+    )
+    path.write_bytes(head.encode() + bytes(2 * 8**3))
+    found = other_voxels(read_header(path, spacing_mm=(0.5, 0.5, 5.0)))
+    assert len(found) == said
+    assert all("where the file has [0.5, 0.5, 0.5]; is that meant?" in text for text in found)
