@@ -116,7 +116,8 @@ def first_gap_mm(grey: Array, arc: Array, noise: float) -> tuple[float, float]:
     grey, arc : (n,) along the line.  noise : standard deviation of the grey.  A gap is darker than most of the line
     before it and most of the line beyond it.
     """
-    for n in np.flatnonzero((arc > SIDE_MM) & (arc < arc[-1] - SIDE_MM)):
+    dark = grey + 2.0 * noise < GAP_SHARE * grey.max()  # no median is above that: a quarter of tracing was medians
+    for n in np.flatnonzero(dark & (arc > SIDE_MM) & (arc < arc[-1] - SIDE_MM)):
         least = GAP_SHARE * min(np.median(grey[:n]), np.median(grey[n:]))
         if grey[n] + 2.0 * noise < least:
             return float(arc[n]), float(arc[n + int(np.argmax(grey[n:] > least))])
