@@ -74,9 +74,9 @@ def size_of(path: Path, most: float = float("inf")) -> int:
     return found.st_size
 
 
-def opened(path: Path) -> BinaryIO:
-    """A regular file, open for reading."""
-    size_of(path)
+def opened(path: Path, most: float = float("inf")) -> BinaryIO:
+    """A regular file of at most ``most`` bytes, open for reading."""
+    size_of(path, most)
     try:
         return path.open("rb")
     except OSError as error:
@@ -85,8 +85,7 @@ def opened(path: Path) -> BinaryIO:
 
 def read_bytes(path: Path, most: int) -> bytes:
     """A whole regular file of at most ``most`` bytes."""
-    size_of(path, most)
-    with opened(path) as file:
+    with opened(path, most) as file:
         return file.read(most + 1)[:most]
 
 

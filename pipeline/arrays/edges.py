@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.special import ndtr
 
-Array = NDArray[np.float64]
+from solver.grid import Array
+
 NEEDED = 2.0
 """How far inside and outside it must be known."""
 EVERY = 0.5

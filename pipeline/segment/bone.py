@@ -11,7 +11,7 @@ from skimage.filters import threshold_otsu
 
 from pipeline.arrays.grids import indices_of, spread
 from pipeline.segment.contact import Contact, counted, named
-from pipeline.segment.levels import BRIGHTER, GreyLevels, Index, grey_around
+from pipeline.segment.levels import BRIGHTER, GreyLevels, Index, box_from, grey_around
 from solver.grid import Grid
 
 SEEN_VOXELS = 5.0
@@ -39,7 +39,7 @@ def touching(scan: Grid, distance: Grid, corner: Index, levels: GreyLevels) -> t
     """
     h = float(np.min(distance.spacing_mm))
     limit = levels.outside + BRIGHTER * levels.contrast
-    box = tuple(slice(int(c), int(c) + n) for c, n in zip(corner, distance.shape, strict=True))
+    box = box_from(corner, distance.shape)
     bright = (distance.values < SEEN_VOXELS * h) & (scan.values[box] > limit)
     near = indices_of(bright)
     # most voxels above the limit are noise: without them the rest lies in a far smaller box

@@ -8,7 +8,8 @@ inner one is the wall. The scan is then shown to the method with what is darker 
 import numpy as np
 
 from pipeline.arrays.edges import EVERY, Layer, layer_in
-from pipeline.segment.levels import Index, grey_around
+from pipeline.arrays.grids import unflattened
+from pipeline.segment.levels import Index, box_from, grey_around
 from solver.grid import Grid
 
 REACH = 8.5, 6.0
@@ -29,7 +30,7 @@ def layer_around(grid: Grid, distance: Grid, corner: Index, seed: tuple[int, ...
     known_mm = min(REACH[1] * h, float(values.max()) - EVERY * h)
     near = np.flatnonzero((values > -REACH[0] * h) & (values < known_mm))
     near = near[:: max(1, len(near) // LOOKED_AT)]
-    index = np.stack(np.unravel_index(near, distance.shape), axis=1) + corner
+    index = unflattened(near, distance.shape) + corner
     layer = layer_in(values.reshape(-1)[near] / h, grid.values[tuple(index.T)])
     if layer is None or layer.inner > -MOVED or seed is None:
         return None
@@ -43,7 +44,7 @@ def with_layer_alone(layer: Layer, grid: Grid, distance: Grid, corner: Index) ->
     distance : signed, on a box that begins at ``corner`` of the scan.  Nearer to the wall noise stays as it is.
     """
     values = np.maximum(grid.values, np.asarray(np.ceil(layer.floor), grid.values.dtype))
-    box = tuple(slice(int(c), int(c) + n) for c, n in zip(corner, distance.shape, strict=True))
+    box = box_from(corner, distance.shape)
     middle = 0.5 * (layer.inner + layer.outer) * float(np.mean(grid.spacing_mm))
     values[box] = np.where(distance.values < middle, grid.values[box], values[box])
     return grid.with_values(values)

@@ -77,6 +77,11 @@ def box_around(grid: Grid, index: NDArray[Any], half_mm: float, least: int) -> t
     return a, b, c
 
 
+def box_from(corner: Index, shape: tuple[int, ...]) -> tuple[slice, ...]:
+    """The voxels of a scan that a box of this shape holds, which begins at a voxel."""
+    return tuple(slice(int(first), int(first) + n) for first, n in zip(corner, shape, strict=True))
+
+
 def _median(values: NDArray[Any], otherwise: float) -> float:
     return float(np.median(values)) if values.size >= 8 else otherwise
 

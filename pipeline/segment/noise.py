@@ -62,9 +62,9 @@ def noise_left(
     if np.count_nonzero(outside) < LEAST:
         return tuple(share * noise for share in WHITE)
     left = []
-    for share in PLANES:
+    for times, share in enumerate(PLANES):
+        grey = smoothed(grey) if times else grey
         second = smoothed(grey, 2)
         third = smoothed(second, 4)
         left.append(float(np.hypot(spread((grey - second)[outside]), spread((second - third)[outside]))) / share)
-        grey = smoothed(grey)
     return tuple(left)

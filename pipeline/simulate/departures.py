@@ -64,12 +64,12 @@ def beside(curves: Sequence[Curve], given: Clamp, sigma_mm: float, voxel_mm: flo
     )
 
 
-def turned(wires: Sequence[Array], curves: Sequence[Array]) -> str:
+def turned(pairs: Sequence[tuple[Array, Array]]) -> str:
     """A warning where traced wires leave an entry, whose direction is taken as stated, in another one than simulated.
 
-    wires, curves : simulated and traced wires (n, 3) of the same frames.
+    pairs : simulated and traced wire (n, 3) of each frame.
     """
-    both = [(w, c) for w, c in zip(wires, curves, strict=True) if min(arc_length(w)[-1], arc_length(c)[-1]) > LEAST_MM]
+    both = [pair for pair in pairs if min(arc_length(line)[-1] for line in pair) > LEAST_MM]
     if not both:
         return ""
     simulated, traced = (np.median([_chord(line) for line in lines], axis=0) for lines in zip(*both, strict=True))

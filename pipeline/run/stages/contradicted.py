@@ -54,9 +54,12 @@ def _leave_elsewhere(known: Known) -> str:
     """What ``turned`` says of a clamp whose direction was not estimated."""
     if known.clamp is None or known.clamp.sigma_deg > 0.0:
         return ""
-    frames = [f for f in simulated_frames(known) if f.ok and f.solved is not None and f.trusted_curve is not None]
-    curves = [curve.points_mm for f in frames if (curve := f.trusted_curve) is not None]
-    return turned([f.solved.joints_mm for f in frames if f.solved is not None], curves)
+    pairs = [
+        (frame.solved.joints_mm, curve.points_mm)
+        for frame in simulated_frames(known)
+        if frame.ok and frame.solved is not None and (curve := frame.trusted_curve) is not None
+    ]
+    return turned(pairs)
 
 
 Squares = tuple[float, int]
