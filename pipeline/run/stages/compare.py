@@ -12,7 +12,7 @@ from pipeline.compare.nulls import Clues, Seen, score
 from pipeline.model import Array, Curve
 from pipeline.run.log import Log
 from pipeline.run.stages.budget import budgeted
-from pipeline.run.stages.contradicted import contradicted
+from pipeline.run.stages.contradicted import contradicted, from_traces
 from pipeline.run.stages.entries import four_entries, replayed_entries
 from pipeline.run.stages.known import Context, Frame, Known
 from pipeline.run.stages.own_curves import rough
@@ -51,11 +51,14 @@ def _simulated_otherwise(
     ways = rival_ways(run, known)
 
     def one(number: int, _earlier: object) -> Any:
-        return rival_wires(run, known, ways[number - 1]) if number else replayed_entries(run, known)
+        if not number:
+            return replayed_entries(run, known)
+        wires = rival_wires(run, known, ways[number - 1])
+        return wires, from_traces(known, wires, run.config.compare)
 
-    entered, *wires = run.share("compare", one, 1 + len(ways), clues.known_ways)
-    run.log.warnings += contradicted(run, known, ways, wires)
-    return entered, simulated_rivals(run, known, ways, wires)
+    entered, *others = run.share("compare", one, 1 + len(ways), clues.known_ways)
+    run.log.warnings += contradicted(run, known, ways, [off for _, off in others])
+    return entered, simulated_rivals(run, known, ways, [wires for wires, _ in others])
 
 
 Row = dict[str, Any]

@@ -23,20 +23,29 @@ FRAME_NEARER, LEAST_MM = 0.4, 0.3
 """The same for a frame alone, whose wire may have let go, and the least rms distance that is worth a word there."""
 
 
-def contradicted(run: Context, known: Known, ways: Sequence[Way], wires: Sequence[Wires]) -> list[str]:
+Squares = tuple[float, int]
+"""Sum of squared distances in mm^2, and of how many points; of none where a wire or a trace is missing."""
+
+
+def from_traces(known: Known, wires: Wires, config: CompareConfig) -> list[Squares]:
+    """By simulated frame, how far a wire's scored points lie from its trace."""
+    return [_squares(frame, wire, config) for frame, wire in zip(simulated_frames(known), wires, strict=True)]
+
+
+def contradicted(run: Context, known: Known, ways: Sequence[Way], otherwise: Sequence[Sequence[Squares]]) -> list[str]:
     """A warning where one of ``ways`` lies far nearer than the wire as stated, in the case or in a frame of it.
 
-    Of several ways, the nearest. wires : of each of ``ways``. Own simulators' wires say nothing about what this one is
-    told.
+    Of several ways, the nearest. otherwise : of each of ``ways``, its wires ``from_traces``. Own simulators' wires say
+    nothing about what this one is told.
     """
     if run.case.simulated is not None:
         return []
-    frames, config = simulated_frames(known), run.config.compare
+    frames = simulated_frames(known)
     elsewhere = _leave_elsewhere(known)
     if elsewhere:
         return [elsewhere]
-    stated = [_squares(f, None if f.solved is None else f.solved.joints_mm, config) for f in frames]
-    otherwise = [[_squares(f, wire, config) for f, wire in zip(frames, own, strict=True)] for own in wires]
+    wires = [None if frame.solved is None else frame.solved.joints_mm for frame in frames]
+    stated = from_traces(known, wires, run.config.compare)
     whole = _nearest(ways, stated, otherwise, FAR_NEARER)
     if whole:
         return [_said("", *whole)]
@@ -60,10 +69,6 @@ def _leave_elsewhere(known: Known) -> str:
         if frame.ok and frame.solved is not None and (curve := frame.trusted_curve) is not None
     ]
     return turned(pairs)
-
-
-Squares = tuple[float, int]
-"""Sum of squared distances in mm^2, and of how many points; of none where a wire or a trace is missing."""
 
 
 def _squares(frame: Frame, wire: Array | None, config: CompareConfig) -> Squares:
