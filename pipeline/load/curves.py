@@ -68,6 +68,9 @@ def read_csv_points(path: Path) -> NDArray[np.float64]:
         raise refused(path, "an empty file", "points", "columns x_mm, y_mm, z_mm")
     head = [c.strip().lower() for c in rows[0]]
     columns = next(([head.index(c) for c in names] for names in _NAMES if set(names) <= set(head)), None)
+    twice = [head[c] for c in columns or () if head.count(head[c]) > 1]
+    if twice:
+        raise refused(path, f"two columns {twice[0]}", "one of each", "leave out the other")
     if columns is None and any(c and not _is_number(c) for c in head[:3]):
         shown = ", ".join(c if c.isprintable() else ascii(c) for c in head[:8]) + " ..." * (len(head) > 8)
         needed = "x_mm, y_mm, z_mm (or x, y, z), separated by commas"

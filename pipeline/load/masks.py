@@ -3,6 +3,7 @@
 Out: a Volume of 0 and 1 (uint8), or of probabilities 0..1 (float32) whose wall is at 0.5.
 """
 
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
@@ -40,11 +41,34 @@ def read_mask(source: Source, least_voxels: int) -> Volume:
 
 
 def mask_header(source: Source) -> Header:
-    """Geometry of a mask's file, its layers counted as one; LoadError where it has none."""
-    if not source.path.name.lower().endswith((".nrrd", ".nhdr")):
-        return read_header(source)
-    with told(source.path):
-        return judged(_header(source, head_of(source.path)))
+    """Geometry of a mask's file, its layers counted as one; LoadError where it has none, or cannot hold the label."""
+    path = source.path
+    if not _is_nrrd(path):
+        header, names = read_header(source), {}
+    else:
+        with told(path):
+            head = head_of(path)
+            header, names = judged(_header(source, head)), head.names
+    _require_label(source, names, np.dtype(header.pixel_type))
+    return header
+
+
+def _is_nrrd(path: Path) -> bool:
+    return path.name.lower().endswith((".nrrd", ".nhdr"))
+
+
+def _require_label(source: Source, names: Collection[str], kind: np.dtype[Any]) -> None:
+    """LoadError for a label by a name that the file has not, or by a number that no voxel of its type can be."""
+    label = source.label if isinstance(source, Mask) else None
+    if isinstance(label, str) and label not in names:
+        hint = did_you_mean(label, names) if names else "the file names none; give a number"
+        raise refused(source.path, f"no label named {label!r}", "one that the file names", hint)
+    # whole numbers may be stored with a factor, but not in NRRD
+    if isinstance(label, int) and kind.kind in "iu" and _is_nrrd(source.path):
+        least, most = np.iinfo(kind).min, np.iinfo(kind).max
+        if not least <= label <= most:
+            allowed = f"{least} to {most}, which voxels of type {kind} can be"
+            raise refused(source.path, f"label {label}", allowed, "name a label of the file")
 
 
 def _header(source: Source, head: Head) -> Header:
@@ -56,11 +80,8 @@ def _voxels(source: Source, label: int | str | None) -> tuple[Volume, dict[str, 
     """The voxels of the layer that holds a label, and (layer, value) of the file's labels by their names."""
     path = source.path
     header = mask_header(source)
-    head = head_of(path) if path.name.lower().endswith((".nrrd", ".nhdr")) else None
+    head = head_of(path) if _is_nrrd(path) else None
     names = head.names if head else {}
-    if isinstance(label, str) and label not in names:
-        hint = did_you_mean(label, names) if names else "the file names none; give a number"
-        raise refused(path, f"no label named {label!r}", "one that the file names", hint)
     if header.item_count > 1:
         raise refused(path, f"{header.item_count} volumes", "one label map", "save the one that is meant")
     if head is None or head.channels == 1:

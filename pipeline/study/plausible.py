@@ -94,10 +94,27 @@ SHALLOWEST_MM, LONGEST_WAY = 1.0, 5.0
 
 
 def odd_depths(case: Case, header: Header | None) -> list[str]:
-    """A sentence where the stated depths are in another unit than mm. header : of a scan of the case."""
+    """Sentences where the stated depths are in another unit than mm, or go down. header : of a scan of the case."""
     if not case.insertion_mm:
         return []
-    deepest = max(case.insertion_mm)
+    return [*_of_no_wire(case.insertion_mm, header), *_drawn_back(case.insertion_mm)]
+
+
+def _drawn_back(depths: Sequence[float]) -> list[str]:
+    """A sentence where depths go down: what friction and the way there do to the wire is replayed as they say."""
+    back = np.flatnonzero(np.diff(depths) < 0.0)
+    if not len(back):
+        return []
+    first = int(back[0])
+    more = f" ({len(back)} times)" if len(back) > 1 else ""
+    return [
+        f"insertion_mm goes down from {depths[first]:g} mm (frame {first}) to {depths[first + 1]:g} mm{more}: the wire "
+        "is replayed as drawn back there; are the frames in order?"
+    ]
+
+
+def _of_no_wire(depths: Sequence[float], header: Header | None) -> list[str]:
+    deepest = max(depths)
     diagonal = np.inf if header is None else float(np.linalg.norm(np.array(header.shape) * header.spacing_mm))
     if SHALLOWEST_MM <= deepest <= LONGEST_WAY * diagonal:
         return []

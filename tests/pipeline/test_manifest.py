@@ -176,6 +176,14 @@ def test_depths_in_another_unit_are_a_warning(tmp_path: Path, depths: str, said:
     assert len(odd_depths(case, header)) == said
 
 
+def test_depths_that_go_down_are_a_warning(tmp_path: Path) -> None:
+    """Files in another order than the scans were made in, or a wire that was drawn back: "no problem found"."""
+    text = GOOD.replace('frames = "frames/*.mha"', 'reference = "frames/a.mha"\ninsertion_mm = [14, 39, 20, 21, 8]')
+    (case,) = read_manifest(written(tmp_path, text)).cases
+    (said,) = odd_depths(case, None)
+    assert said.startswith("insertion_mm goes down from 39 mm (frame 1) to 20 mm (2 times): ")
+
+
 @pytest.mark.parametrize(("radius_mm", "modulus_gpa"), [(0.18, 9.5), (0.444, 9.5), (0.444, 158.4), (0.1, 60.0)])
 def test_real_wires_are_no_warning(tmp_path: Path, radius_mm: float, modulus_gpa: float) -> None:
     """Moduli measured by Harrison et al. 2011; the catalogue's own wires are softer."""

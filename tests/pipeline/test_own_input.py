@@ -19,6 +19,7 @@ from pipeline.load import LoadError
 from pipeline.load.curves import read_curve, read_truth
 from pipeline.load.geometry import Mask, Source
 from pipeline.load.lumens import read_lumen
+from pipeline.load.masks import mask_header
 from pipeline.load.views import read_views
 from pipeline.load.wires import read_wires
 from pipeline.model import Shapes
@@ -152,6 +153,14 @@ def test_one_label_of_several_by_number(tmp_path):
         mask(tmp_path / "seg.nii.gz", label="artery")
 
 
+@pytest.mark.parametrize(("label", "said"), [(300, "label 300; expected 0 to 255"), ("vein", "no label named 'vein'")])
+def test_a_label_that_a_file_cannot_have_is_seen_in_its_header(tmp_path, label, said):
+    """`check` found nothing: it was the case that failed."""
+    labels(tmp_path / "seg.nrrd", np.zeros((4, 4, 4), np.uint8), 0.3, np.zeros(3))
+    with pytest.raises(LoadError, match=said):
+        mask_header(Mask(tmp_path / "seg.nrrd", label=label))
+
+
 @pytest.mark.parametrize("top", [1.0, 255.0])
 def test_a_probability_has_its_wall_at_a_half(tmp_path, top):
     """0 to 255 was taken as everything but 0: nearly twice the lumen."""
@@ -248,7 +257,15 @@ def test_a_table_says_its_space_and_unit(tmp_path, said, turned, factor):
 
 
 @pytest.mark.parametrize(
-    "text", ["", "x_mm,y_mm,z_mm\n1,2,3", "a,b\n1,2", "1,2,nan\n3,4,5", "# unit: foot\nx,y,z\n1,2,3\n4,5,6"]
+    "text",
+    [
+        "",
+        "x_mm,y_mm,z_mm\n1,2,3",
+        "x_mm,y_mm,z_mm,x_mm\n1,2,3,4\n5,6,7,8",
+        "a,b\n1,2",
+        "1,2,nan\n3,4,5",
+        "# unit: foot\nx,y,z\n1,2,3\n4,5,6",
+    ],
 )
 def test_a_curve_that_is_none_is_refused(tmp_path, text):
     (tmp_path / "a.csv").write_text(text, encoding="utf-8")
