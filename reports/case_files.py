@@ -224,6 +224,11 @@ def not_reached(out_dir: Path) -> str:
     return f"Nothing is scored: the run was to end before frames are compared (--until {ends[0]})." if early else ""
 
 
+def doubted(out_dir: Path) -> list[str]:
+    """What the runs into a folder found doubtful in their manifests, each sentence once."""
+    return list(dict.fromkeys(str(text) for run in _runs(out_dir) for text in run.get("doubts", ())))
+
+
 def _runs(out_dir: Path) -> list[dict[str, Any]]:
     """What the runs into a folder say of themselves; nothing where that is damaged, which ``wireval run`` refuses."""
     try:

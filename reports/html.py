@@ -15,6 +15,7 @@ from reports.case_files import (
     CaseFiles,
     amiss,
     counted,
+    doubted,
     find_cases,
     left_out_sentence,
     left_over_sentence,
@@ -119,7 +120,7 @@ def render_index(out_dir: Path, embed: bool = False, each: Each = one_by_one) ->
         "beside_others": (out_dir / SIMULATORS.file).exists(),
         **_not_counted(out_dir),
         "assumptions": [text for run in infos for text in run.get("assumptions", ())],
-        "warnings": said_by_cases({case.name: case.result for case in cases}, "warnings"),
+        "warnings": [*doubted(out_dir), *said_by_cases({case.name: case.result for case in cases}, "warnings")],
         "numbers": _content.in_tiles(_content.overall(declared("overall"), whole)),
         # the first stands beside the tiles: not the map of hundreds of cases, which is taller than a screen
         "sections": sorted(draw_sections("run", files, out_dir, embed, each), key=_is_tall),

@@ -9,7 +9,7 @@ from typing import Any
 import pandas as pd
 
 from reports._content import NOTHING, fewer_frames, interval, number, predictor_label
-from reports.case_files import WORST, counted, results_in, said_by_cases
+from reports.case_files import WORST, counted, doubted, results_in, said_by_cases
 from reports.records import read_json
 from reports.schema import SUMMARY
 
@@ -224,11 +224,12 @@ def worst_frames(tables: Mapping[str, pd.DataFrame], links: Mapping[str, str]) -
 
 
 def warned(out_dir: Path) -> list[str]:
-    """What was warned of in the cases of a run, a line each text, no more than a few.
+    """What is doubtful in a run's manifest, and what was warned of in its cases, a line each text, no more than a few.
 
     Once for all cases that say it: on a screen of 30 lines the failures above are to stay in sight.
     """
-    lines = [f"warning: {text}" for text in said_by_cases(results_in(out_dir), "warnings")]
+    said = [*doubted(out_dir), *said_by_cases(results_in(out_dir), "warnings")]
+    lines = [f"warning: {text}" for text in said]
     rest = len(lines) - _MANY
     return [*lines[:_MANY], *[f"{counted(rest, 'more warning')} on the pages of the cases"] * (rest > 0)]
 

@@ -11,7 +11,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pipeline.arrays.polyline import angle_deg, at_arc, samples, tip_tangent
+from pipeline.arrays.polyline import angle_deg, at_arc, samples
 from pipeline.compare.branches import Branches
 from pipeline.compare.config import CompareConfig
 from pipeline.model import Array, Curve, Lumen, OtherWire, arc_length
@@ -207,6 +207,12 @@ def side_agrees(pair: Pair) -> float:
     return float(np.mean(np.sum(first * second, axis=1)[known] > 0)) if known.any() else float("nan")
 
 
+def _last_chord(points: Array) -> Array:
+    """The way (3,) over a curve's last millimetre. From vertex to vertex it would be longer the coarser a curve is."""
+    length = float(arc_length(points)[-1])
+    return np.asarray(points[-1] - at_arc(points, max(length - 1.0, 0.0)))
+
+
 OF_POINTS: dict[str, Callable[[Array], float]] = {
     "rms_mm": rms,
     "mean_mm": lambda errors: float(errors.mean()),
@@ -224,7 +230,7 @@ METRICS: dict[str, Metric] = {
     "arc_rms_mm": lambda pair: rms(pair.by_arc_mm),
     "arc_max_mm": lambda pair: float(pair.by_arc_mm.max(initial=0.0)) if len(pair.by_arc_mm) else float("nan"),
     "tip_mm": lambda pair: float(np.linalg.norm(pair.wire_mm[-1] - pair.curve_mm[-1])),
-    "tip_angle_deg": lambda pair: angle_deg(tip_tangent(pair.wire_mm), tip_tangent(pair.curve_mm)),
+    "tip_angle_deg": lambda pair: angle_deg(_last_chord(pair.wire_mm), _last_chord(pair.curve_mm)),
     "branch_ok": same_branch,
     "tip_along_mm": lambda pair: tip_offset(pair)[0],
     "tip_across_mm": lambda pair: tip_offset(pair)[1],

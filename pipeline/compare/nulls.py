@@ -24,6 +24,9 @@ from solver import Grid, GuideWire, Status, VesselWall, relax
 
 CENTRE_POWER = 3
 """Cost = (clearance + voxel)^-3: high enough to hold the path on the medial line in bends (at 2 it cuts corners)."""
+TIE = 0.01
+"""By so much more a voxel at the wall costs the shortest path than one on the axis. From voxel to voxel many ways are
+equally short, and may lie a millimetre apart: the last digit of a voxel size chose between them."""
 ROOM_MM = 8.0
 """Paths are looked for in the traced wires' box and this much around it: a detour outside is no predictor."""
 HARD_WALL_N_MM2 = 100.0
@@ -58,7 +61,7 @@ class Clues:
     @cached_property
     def shortest(self) -> Array | None:
         """The shortest path (n, 3) that leaves the wire's radius to the wall."""
-        return self._path(self.radius_mm, np.ones_like)
+        return self._path(self.radius_mm, lambda clearance: 1.0 + TIE * (1.0 - clearance / clearance.max()))
 
     def _path(self, room_mm: float, cost: Callable[[Array], Array]) -> Array | None:
         """The cheapest path through voxels that are further from the wall than ``room_mm`` or half the greatest."""

@@ -12,7 +12,7 @@ from pipeline.arrays.edges import Layer
 from pipeline.arrays.fingerprint import known_with_place
 from pipeline.arrays.grids import in_memory_order, reorder
 from pipeline.model import Lumen, Volume
-from pipeline.segment import bone, uneven
+from pipeline.segment import bone, uneven, valley
 from pipeline.segment.config import SegmentConfig
 from pipeline.segment.contact import contacts, warning
 from pipeline.segment.cut_off import cut_off
@@ -118,7 +118,7 @@ def segment(
         add_balls(wall.values, np.asarray(grid.spacing_mm), thin, config.outer_mm)
     other = brighter(wall.levels) + bright + uneven.warning(found.least)
     said: tuple[str, ...] = () if found.layer is None else (surrounded(found.layer, float(np.mean(grid.spacing_mm))),)
-    said += cut_off(scan, found.distance, site.corner) + warning(open_ones)
+    said += cut_off(scan, found.distance, site.corner) + warning(open_ones) + valley.warning(grid, region.passing)
     said += other or bone.two_greys(grid, found.distance, site.corner, wall.levels, wall.blur_mm)
     box = wall.values, site.corner
     said += add_necks(region.necks, box, grid, region.levels, blur)

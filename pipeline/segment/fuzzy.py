@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pipeline.segment import valley
 from pipeline.segment._kernels.connect import Affinity
 from pipeline.segment.config import SegmentConfig
 from pipeline.segment.connect import connect, connect_relative, estimate_affinity, neighbours
@@ -79,10 +80,11 @@ def fuzzy_region(
         "voxels_total": total, "voxels_read": read, "voxels_read_again": more, "voxels_skipped": total - read,
     }  # fmt: skip
     region = Region(order, np.zeros(0, np.int64), levels, affinity.taps, counters)
-    beyond, thin = None, np.zeros(0, np.int64)
+    beyond = None
     if not len(config.other_seeds_mm):  # what lies behind a neck might be what those seeds are to cut off
         region, beyond = through_necks(grid, low, region, affinity, config)
     if len(low) > len(region.voxels):
-        thin = thin_branches(beyond or beyond_vessel(grid, low, region.voxels, levels, affinity))
-    counters = {**region.counters, "voxels_visited": float(len(region.voxels)), "voxels_thin": float(len(thin))}
-    return replace(region, thin=thin, counters=counters)
+        found = thin_branches(beyond or beyond_vessel(grid, low, region.voxels, levels, affinity))
+        region = valley.with_own(grid, low, region, found)
+    counters = {**region.counters, "voxels_visited": float(len(region.voxels)), "voxels_thin": float(len(region.thin))}
+    return replace(region, counters=counters)

@@ -210,6 +210,7 @@ class Region:
 
     thin : flat indices of branches too thin for a wall at half height.  levels : grey inside and outside.  taps : the
     separable smoothing of the grey in which the wall is looked for.  necks : axes (n, 3), voxels, of the necks passed.
+    passing : the voxels (3,) where other thin vessels pass by.
     """
 
     voxels: Index
@@ -218,6 +219,7 @@ class Region:
     taps: NDArray[np.float32]
     counters: Counters
     necks: tuple[NDArray[np.float64], ...] = ()
+    passing: tuple[Index, ...] = ()
 
 
 def failed(got: str, allowed: str, do: str) -> StageError:

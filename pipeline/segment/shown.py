@@ -14,6 +14,8 @@ from pipeline.model import Array, Lumen, Volume
 
 NEAR_VOXELS = 3.0
 """The most by which a wall is moved; voxels are looked at up to twice as far outside the given one."""
+STARTS = np.arange(-NEAR_VOXELS, NEAR_VOXELS + 0.1)
+"""Walls from which it is looked for, voxels outside the given one."""
 CLEAR_VOXELS = 1.5
 """Distance from a wall from which its blur leaves grey alone."""
 POINTS = 30_000
@@ -71,21 +73,34 @@ def _near(lumen: Lumen, reach_mm: float) -> tuple[Array, Array, Array]:
 def _offset(grey: Array, normals: Array, distance: Array) -> Array | None:
     """By how much the seen wall lies outside the given one, and its shift (3,), all in voxels; None where unseen."""
     design = np.concatenate([np.ones((len(grey), 1)), normals], axis=1)
-    found = np.zeros(4)
+    # from a wall two voxels off no step leads to the right one: its blur does not reach so far
+    tries = [(float(np.mean(np.abs(rest))), w) for w in STARTS if (rest := _rest(grey, distance - w)) is not None]
+    if not tries:
+        return None
+    found = np.array([min(tries)[1], 0.0, 0.0, 0.0])
     for _ in range(ROUNDS):
         from_wall = distance - design @ found
-        levels = _levels(grey, from_wall)
-        if levels is None:
-            return None
-        inside, outside = levels
-        at = from_wall / BLUR_VOXELS
-        rest = (grey - outside) / (inside - outside) - ndtr(-at)
+        rest = _rest(grey, from_wall)
+        if rest is None:  # of a vessel three voxels across too few lie deep in it
+            return found
         kept = np.abs(rest) < 3.0 * max(spread(rest), 1e-6)  # a bone, another vessel, a wire
-        slope = (np.exp(-0.5 * at**2) / (BLUR_VOXELS * np.sqrt(2.0 * np.pi)))[kept, None] * design[kept]
+        steep = np.exp(-0.5 * (from_wall / BLUR_VOXELS) ** 2) / (BLUR_VOXELS * np.sqrt(2.0 * np.pi))
+        slope = steep[kept, None] * design[kept]
+        if not np.any(slope):  # the wall is nowhere near
+            return None
         known = slope.T @ slope
         known += 1e-3 * np.trace(known) * np.eye(4)  # a straight tube does not show where along itself it lies
         found = np.clip(found + np.linalg.solve(known, slope.T @ rest[kept]), -NEAR_VOXELS, NEAR_VOXELS)
     return found
+
+
+def _rest(grey: Array, from_wall: Array) -> Array | None:
+    """Grey (n,) in shares of the step less that of a wall at these distances; None where there is no step."""
+    levels = _levels(grey, from_wall)
+    if levels is None:
+        return None
+    inside, outside = levels
+    return np.asarray((grey - outside) / (inside - outside) - ndtr(-from_wall / BLUR_VOXELS))
 
 
 def _levels(grey: Array, from_wall: Array) -> tuple[float, float] | None:
@@ -94,4 +109,4 @@ def _levels(grey: Array, from_wall: Array) -> tuple[float, float] | None:
     if min(np.count_nonzero(deep), np.count_nonzero(out)) < LEAST_POINTS // 10:
         return None
     inside, outside = float(np.median(grey[deep])), float(np.median(grey[out]))
-    return None if abs(inside - outside) < LEAST_NOISES * spread(grey[out]) else (inside, outside)
+    return None if abs(inside - outside) <= LEAST_NOISES * spread(grey[out]) else (inside, outside)

@@ -112,15 +112,15 @@ def low_region(volume: Grid, seeds: Index, levels: GreyLevels, affinity: Affinit
     return (np.zeros(0, np.int64), 0.0) if tables is None else connect(volume, seeds, tables, 0.5, neighbours(6))
 
 
-def thin_branches(beyond: Beyond) -> Index:
-    """Flat indices of the voxels of thin branches, among those beyond the vessel."""
+def thin_branches(beyond: Beyond) -> list[Index]:
+    """The voxels (flat) of each thin branch, among those beyond the vessel."""
     if not beyond.thick or len(beyond.voxels) < SHORTEST:
-        return np.zeros(0, np.int64)
+        return []
     part, steps = along_cores(beyond.inner, np.ones(len(beyond.voxels), bool))
     count = np.bincount(part)
     length, most = largest(part, steps + 1, len(count)), largest(part, beyond.share, len(count))
     good = (length >= SHORTEST) & (count <= FATTEST * length) & (most <= BRIGHTEST)
-    return np.asarray(beyond.voxels[good[part]], np.int64)
+    return [np.asarray(beyond.voxels[part == number], np.int64) for number in np.flatnonzero(good)]
 
 
 def _highest(points: Array, share: Array) -> NDArray[np.bool_]:

@@ -39,12 +39,16 @@ def found_for(case: str, place: Path, alone: bool) -> list[str]:
     manifest has one case, it may hold the files themselves. Raises UsageError where none of this is so.
     """
     if any(mark in place.name for mark in "*?["):
-        return _sorted(place.parent.glob(place.name)) if alone else _refuse(case, place, "a pattern serves one case")
+        return _matching(case, place) if alone else _refuse(case, place, "a pattern serves one case")
     if status_of(place) is None:
         raise UsageError([f"--curves {place}: no such file or folder"])
     if not is_folder(place):
         size_of(place)
         return [str(place)] if alone else _refuse(case, place, "one file serves one case")
+    ran = [path.name for path in place.glob("cases/*") if is_folder(path)]
+    if ran and case not in ran:
+        has = f"{', '.join(sorted(ran)[:4])}{' ...' * (len(ran) > 4)}"
+        return _refuse(case, place, f"it is the output of a run, of {has}")
     named = [place / "cases" / case / "frames.h5", place / case, place / f"{case}.h5", *[place] * alone]
     here = next((path for path in named if path.exists()), None)
     if here is None:
@@ -60,6 +64,15 @@ def found_for(case: str, place: Path, alone: bool) -> list[str]:
         found = f"; found {', '.join(names[:4])}{' ...' * (len(names) > 4)}" if names else "; it is empty"
         return _refuse(case, here, f"no wire in it ({', '.join(KINDS)}){found}")
     return _sorted(inside)
+
+
+def _matching(case: str, pattern: Path) -> list[str]:
+    """The files that a pattern matches; at least one."""
+    found = list(pattern.parent.glob(pattern.name))
+    if not found:
+        return _refuse(case, pattern, "it matches no file")
+    folder = next((path for path in found if is_folder(path)), None)
+    return _sorted(found) if folder is None else _refuse(case, pattern, f"it matches a folder, {folder.name}")
 
 
 def _sorted(paths: Any) -> list[str]:

@@ -108,6 +108,15 @@ def line(length: float, offset: float = 0.0, step: float = 1.0) -> np.ndarray:
     return np.column_stack([arc, np.full_like(arc, offset), np.zeros_like(arc)])
 
 
+@pytest.mark.parametrize("step", [0.25, 0.7, 0.75, 1.0])
+def test_the_angle_of_the_tips_is_over_a_millimetre_whatever_the_steps(step: float) -> None:
+    """A bent tip of 8 mm radius: its last chord was taken from vertex to vertex, up to two steps long."""
+    arc = samples(10.0, step)
+    bent = np.column_stack([8.0 * np.sin(arc / 8.0), 8.0 * (1.0 - np.cos(arc / 8.0)), np.zeros_like(arc)])
+    result = compare(simulated(line(10.0)), traced(bent), open_space())
+    assert result["tip_angle_deg"] == pytest.approx(np.degrees(9.5 / 8.0), abs=0.5)  # a chord's sagitta, 0.016 mm
+
+
 def test_parallel_lines_are_as_far_apart_as_they_are() -> None:
     result = compare(simulated(line(20.0)), traced(line(20.0, 0.3)), open_space())
     for name in ("rms_mm", "mean_mm", "p95_mm", "max_mm", "back_rms_mm", "hausdorff_mm", "arc_rms_mm", "tip_mm"):

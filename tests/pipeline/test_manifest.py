@@ -156,6 +156,10 @@ def test_a_clamp_cannot_be_borrowed_from_nowhere_or_in_a_ring(tmp_path: Path) ->
         (("radius_mm = 0.18", "radius_mm = 0.89"), "radius_mm = 0.89: guide wires have 0.1 to 0.5 mm; is it the diam"),
         (("radius_mm = 0.18", "radius_mm = 0.007"), "radius_mm = 0.007: guide wires have 0.1 to 0.5 mm; is it in an"),
         (("[[0.0, 0.5], [30.0, 5.0]]", "[[0.0, 5.0], [30.0, 0.5]]"), "bending_stiffness_N_mm2 is 5 at the tip and 0.5"),
+        (
+            ("[30.0, 5.0]]", "[30.0, 5.0]]\nrest_curvature_per_mm = 8.3"),
+            "rest_curvature_per_mm of 8.3 at the most: a be",
+        ),
         (("[30.0, 5.0]]", "[30.0, 5.0]]\nweight_N_per_mm = 7e-3"), "weight_N_per_mm = 0.007: a rod of"),
     ],
 )

@@ -48,6 +48,17 @@ def test_the_shortest_way_hugs_the_inner_wall(quarter_torus: tuple[Lumen, np.nda
     assert arc_length(path)[-1] < arc_length(axis)[-1]
 
 
+def test_the_last_digit_of_a_voxel_size_does_not_choose_the_shortest_way(
+    quarter_torus: tuple[Lumen, np.ndarray],
+) -> None:
+    """Of many equally short ways from voxel to voxel: the predictor's error changed by 0.19 mm with 5e-15 mm."""
+    lumen, axis = quarter_torus
+    grid = lumen.distance
+    spacing = grid.spacing_mm + np.array([0.0, 5e-15, 1e-14])
+    other = clues_of(Lumen(Grid(grid.values, spacing, grid.origin_mm, grid.direction)), axis)
+    np.testing.assert_allclose(other.shortest, clues_of(lumen, axis).shortest, rtol=0.0, atol=1e-9)
+
+
 def test_the_least_bent_curve_stays_inside_and_bends_less(quarter_torus: tuple[Lumen, np.ndarray]) -> None:
     lumen, axis = quarter_torus
     depth = 0.9 * float(arc_length(axis)[-1])

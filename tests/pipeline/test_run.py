@@ -235,6 +235,34 @@ def test_a_sweep_reads_the_lumen_of_a_case_once(study: Path, tmp_path: Path, mon
     assert read.count("segment") == 2, "another run reads it anew"
 
 
+def edited(study: Path, folder: Path, old: str, new: str) -> Path:
+    """The study with another manifest."""
+    shutil.copytree(study, folder)
+    text = (folder / "manifest.toml").read_text(encoding="utf-8")
+    assert old in text
+    (folder / "manifest.toml").write_text(text.replace(old, new), encoding="utf-8")
+    return folder
+
+
+def test_what_is_doubtful_in_a_manifest_is_said_by_the_run_itself(
+    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Only `check` and a dry run said it, which nobody has to call; -q hides no warning."""
+    folder, out = edited(study, tmp_path / "study", "radius_mm = 0.18", "radius_mm = 0.51"), tmp_path / "out"
+    assert run(folder, out, "-q", "--until", "segment") == 0
+    said = "radius_mm = 0.51: guide wires have 0.1 to 0.5 mm"
+    assert said in capsys.readouterr().err
+    assert said in (out / "index.html").read_text(encoding="utf-8")
+
+
+def test_a_bend_too_sharp_to_be_five_times_as_sharp_is_compared(study: Path, tmp_path: Path) -> None:
+    """The case crashed: "got 1.6", which nobody had stated."""
+    new = "rest_curvature_per_mm = [[0.0, 0.32], [8.0, 0.32], [8.0, 0.0]]"
+    folder = edited(study, tmp_path / "s", "rest_curvature_per_mm = [[0.0, 0.12], [8.0, 0.12], [8.0, 0.0]]", new)
+    assert run(folder, tmp_path / "out", *UNTIL, "--set", "solver.segment_mm=2", "--set", "budget.members=0") in (0, 1)
+    assert not errors_of(tmp_path / "out")["status"].eq("crashed").any()
+
+
 def with_lumen(study: Path, folder: Path, labels: np.ndarray, like: sitk.Image) -> Path:
     """The study with a label map as its lumen."""
     if not folder.exists():
@@ -247,6 +275,17 @@ def with_lumen(study: Path, folder: Path, labels: np.ndarray, like: sitk.Image) 
     image.CopyInformation(like)
     sitk.WriteImage(image, str(folder / "lumen.nrrd"))
     return folder
+
+
+def test_a_lumen_that_lies_elsewhere_is_what_fails(study: Path, finished: Path, tmp_path: Path) -> None:
+    """A mask that lost its scan's origin: every frame failed, and a wire that nobody saw was named for it."""
+    like = sitk.ReadImage(str(finished / "cases" / "bifurcation" / "view" / "lumen.seg.nrrd"))
+    labels = sitk.GetArrayFromImage(like)
+    like.SetOrigin((0.0, 0.0, 0.0))
+    folder = with_lumen(study, tmp_path / "study", labels, like)
+    assert run(folder, tmp_path / "out", *UNTIL) == 1
+    assert set(errors_of(tmp_path / "out")["status"]) == {"segment_failed"}
+    assert "outside the given lumen, which spans" in (tmp_path / "out" / "failures.csv").read_text(encoding="utf-8")
 
 
 def reused_traces(out: Path) -> float:

@@ -361,10 +361,15 @@ def test_where_curves_are_looked_for(known: Known, tmp_path: Path, capsys: pytes
     write_csv(full, known[1])
     (bare / "deeper").mkdir(parents=True)
     (bare / "notes.txt").touch()
+    ran = tmp_path / "ran"
+    (ran / "cases" / "other").mkdir(parents=True)
     for curves, out, said in (
         (tmp_path / "nowhere", "o", f"\n--curves {tmp_path / 'nowhere'}: no such file or folder\n"),
         (bare, "o", "no wire in it (.csv, .vtp, .mrk.json, .vtk, .h5, .hdf5); found deeper/, notes.txt; give a folder"),
         (mixed, "o", ".csv and .vtp files"),
+        (f"a={full}/*.vtk", "o", "it matches no file"),
+        (f"a={tmp_path}/fu*", "o", "it matches a folder, full"),
+        (ran, "o", "it is the output of a run, of other"),
         (f"wireval={full}", "o", "the name 'wireval'"),
         ("sofa=", "o", "no place after the name"),
         (full, "full", "holds no score"),

@@ -59,3 +59,18 @@ def test_no_branch_is_made_of_noise_or_of_the_skirt_of_a_vessel():
     for seed in range(100, 104):
         lumen = lumen_of(0.0, 9, seed)
         assert lumen.counters["voxels_thin"] == 0
+
+
+@pytest.mark.parametrize(("gap_mm", "tilt_deg"), [(0.6, 0.0), (0.8, 0.0), (0.6, 40.0), (0.8, 70.0)])
+def test_a_thin_vessel_that_passes_by_is_no_branch(gap_mm, tilt_deg):
+    """Of 0.5 mm radius, two voxels beside the vessel: it was its branch, all along, in silence."""
+    y = POINTS[..., 1] * np.cos(np.radians(tilt_deg)) - POINTS[..., 2] * np.sin(np.radians(tilt_deg))
+    other = np.hypot(POINTS[..., 0] - (2.0 + gap_mm + 0.5), y) - 0.5
+    distance = np.minimum(np.hypot(POINTS[..., 0], POINTS[..., 1]) - 2.0, other)
+    clean = 100.0 + 900.0 * phantoms.partial_volume(distance, VOXEL)
+    grey = phantoms.scan(clean, 0.8, 900.0 / 12.0, 101)
+    lumen = segment(Volume(np.asfortranarray(grey), [VOXEL] * 3, LOW), [[0.0, 0.0, 0.0]])
+    inside = lumen.distance.to_mm(np.argwhere(lumen.distance.values < 0).astype(float))
+    assert inside[:, 0].max() < 2.0 + 0.5 * gap_mm
+    # at 40 degrees it is not even connected
+    assert tilt_deg == 40.0 or any("beside the lumen" in text for text in lumen.warnings)

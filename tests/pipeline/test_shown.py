@@ -46,7 +46,7 @@ def test_a_lumen_that_fits_is_nothing_to_speak_of(tube: Grid, by_mm: float) -> N
     assert beside_the_wall(larger(tube, by_mm), scan_of(tube)) == []
 
 
-@pytest.mark.parametrize("by_mm", [0.4, 1.0, -0.4])
+@pytest.mark.parametrize("by_mm", [0.4, 1.0, 1.1, -0.4, -0.8])
 def test_a_lumen_of_another_size_is_told_by_how_much(tube: Grid, by_mm: float) -> None:
     """A mask dilated by one voxel multiplied the error by 3.5, and nothing was said."""
     (told,) = beside_the_wall(larger(tube, by_mm), scan_of(tube))

@@ -19,6 +19,8 @@ from pipeline.simulate.departures import turned
 FAR_NEARER = 0.7
 """Share of its rms distance below which a wire that is simulated otherwise speaks against what is stated: half the mean
 square. Of a wire turned by 60 degrees or more, the right roll is that."""
+FEWEST = 3
+"""Frames from which that says something: of one, which any small cause may bend, half the distance is no news."""
 FRAME_NEARER, LEAST_MM = 0.4, 0.3
 """The same for a frame alone, whose wire may have let go, and the least rms distance that is worth a word there."""
 
@@ -46,7 +48,8 @@ def contradicted(run: Context, known: Known, ways: Sequence[Way], otherwise: Seq
         return [elsewhere]
     wires = [None if frame.solved is None else frame.solved.joints_mm for frame in frames]
     stated = from_traces(known, wires, run.config.compare)
-    whole = _nearest(ways, stated, otherwise, FAR_NEARER)
+    seen = sum(count > 0 for _, count in stated)
+    whole = _nearest(ways, stated, otherwise, FAR_NEARER) if seen >= FEWEST else None
     if whole:
         return [_said("", *whole)]
     turned = [way.without == ROLL for way in ways]

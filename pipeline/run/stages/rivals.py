@@ -87,13 +87,16 @@ def simulated_rivals(
 
 
 def rival_wires(run: Context, known: Known, way: Way) -> Wires:
-    """The wires under one of ``rival_ways``."""
+    """The wires under one of ``rival_ways``; none where the solver has no such wire, as of five times a sharp bend."""
     case, lumen, clamp, frames = run.case, known.lumen, known.clamp, simulated_frames(known)
     assert lumen is not None
     assert clamp is not None
     settings = replace(run.config.solver, segment_mm=known.segment_mm, finest_mm=run.config.solver.step_mm)
     catheter = case.catheter if way.catheter else None
-    insertion = insertion_of(case.wire, case.wall, lumen, clamp, settings, way.config, catheter)
+    try:
+        insertion = insertion_of(case.wire, case.wall, lumen, clamp, settings, way.config, catheter)
+    except ValueError:
+        return [None] * len(frames)
     tips = [min(f.catheter_mm, f.depth_mm) for f in frames] if catheter else None
     rolls = [frame.roll_deg + way.turn_deg for frame in frames]
     wires = simulate(insertion, [frame.depth_mm for frame in frames], rolls, tips)

@@ -8,11 +8,13 @@ from pipeline.arrays.cores import on_cores
 from pipeline.arrays.grids import corners_mm
 from pipeline.load import Crop
 from pipeline.load.lumens import read_lumen
-from pipeline.model import Lumen
+from pipeline.model import Array, Lumen
 from pipeline.run.projections import slabs
 from pipeline.run.stages.known import Context, Known
 from pipeline.segment import segment
 from pipeline.segment.given import given_lumen
+from pipeline.segment.levels import failed
+from pipeline.segment.opened import outside_mm
 from pipeline.segment.shown import beside_the_wall
 from pipeline.status import StageError
 from reports.frames_file import ScanCrop
@@ -24,6 +26,7 @@ def segment_vessel(run: Context, known: Known) -> Known:
     if case.lumen is not None:
         with log.timed("segment"):
             lumen = given_lumen(read_lumen(case.lumen, config.segment.least_voxels), config.segment)
+        _require_entry(run, lumen)
         log.assumptions += lumen.warnings
         log.warnings += _held_against(run, known, lumen)
         return replace(known, lumen=lumen)
@@ -40,6 +43,30 @@ def segment_vessel(run: Context, known: Known) -> Known:
     log.warnings += lumen.warnings
     log.progress("segment", 1, 1, f"{int(np.count_nonzero(lumen.distance.values < 0))} voxels")
     return replace(known, lumen=lumen)
+
+
+FAR_OUTSIDE = 2.0
+"""Voxels outside a given lumen from which an entry was not meant for it: one in its wall is the solver's to judge."""
+
+
+def _require_entry(run: Context, lumen: Lumen) -> None:
+    """StageError where the user's own lumen is not where the wire enters: wires would be missed, not the lumen."""
+    grid = lumen.distance
+    out = float(outside_mm(grid, np.array([run.case.entry_mm]))[0])
+    if out > FAR_OUTSIDE * float(np.max(grid.spacing_mm)):
+        low, high = (corner.round(1).tolist() for corner in _box_of(lumen))
+        raise failed(
+            f"entry_mm {list(run.case.entry_mm)} lies {out:.1f} mm or more outside the given lumen, which spans {low} "
+            f"to {high} mm in LPS",
+            "a lumen that the wire enters",
+            "check its axes (LPS or RAS), its grid (was the scan's geometry kept?), its unit and which label is meant",
+        )
+
+
+def _box_of(lumen: Lumen) -> tuple[Array, Array]:
+    """The corners (3,) of the box, along the axes of LPS, of the voxels inside."""
+    inside = lumen.distance.to_mm(np.argwhere(lumen.distance.values < 0))
+    return inside.min(axis=0), inside.max(axis=0)
 
 
 def _held_against(run: Context, known: Known, lumen: Lumen) -> list[str]:
