@@ -18,6 +18,7 @@ from pipeline.compare.branches import branches_of
 from pipeline.compare.config import CompareConfig
 from pipeline.compare.metrics import Way, point_to_curve, rms, scored
 from pipeline.compare.pinned import pinned
+from pipeline.compare.taut import pulled_tight
 from pipeline.model import Array, Clamp, Lumen
 from reports.schema import ERRORS, predictor
 from solver import Grid, GuideWire, Status, VesselWall, relax
@@ -26,7 +27,8 @@ CENTRE_POWER = 3
 """Cost = (clearance + voxel)^-3: high enough to hold the path on the medial line in bends (at 2 it cuts corners)."""
 TIE = 0.01
 """By so much more a voxel at the wall costs the shortest path than one on the axis. From voxel to voxel many ways are
-equally short, and may lie a millimetre apart: the last digit of a voxel size chose between them."""
+equally short, and may lie a millimetre apart: the last digit of a voxel size chose between them. They are pulled tight
+after that."""
 ROOM_MM = 8.0
 """Paths are looked for in the traced wires' box and this much around it: a detour outside is no predictor."""
 HARD_WALL_N_MM2 = 100.0
@@ -61,12 +63,17 @@ class Clues:
     @cached_property
     def shortest(self) -> Array | None:
         """The shortest path (n, 3) that leaves the wire's radius to the wall."""
-        return self._path(self.radius_mm, lambda clearance: 1.0 + TIE * (1.0 - clearance / clearance.max()))
+        path = self._path(self.radius_mm, lambda clearance: 1.0 + TIE * (1.0 - clearance / clearance.max()))
+        return None if path is None else pulled_tight(path, self.room, self._room_mm(self.radius_mm))
+
+    def _room_mm(self, wanted_mm: float) -> float:
+        """What a path leaves to the wall: as much as wanted, or half of the greatest depth."""
+        return min(wanted_mm, 0.5 * float(-self.room.values.min()))
 
     def _path(self, room_mm: float, cost: Callable[[Array], Array]) -> Array | None:
         """The cheapest path through voxels that are further from the wall than ``room_mm`` or half the greatest."""
         depth = -self.room.values
-        open_to = depth > np.float64(min(room_mm, 0.5 * float(depth.max())))
+        open_to = depth > np.float64(self._room_mm(room_mm))
         costs = np.full(depth.shape, np.inf)
         costs[open_to] = cost(depth[open_to].astype(np.float64))
         path = voxel_path(self.room, costs, self.clamp.entry_mm, self.deepest_mm[-1])

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from pipeline.run.another import with_another
+from pipeline.run.another import copies, with_another
 from pipeline.run.overall import found_cases, frames_of, overall, shared_scans, strangers, validation
 from pipeline.run.results import Result, write_json
 from reports import tables
@@ -54,7 +54,8 @@ class Totals:
 def aggregate(out: Path, run_info: dict[str, Any] | None = None, name: str = "run.json") -> Totals:
     """Write the tables over all cases found, and ``name`` where ``run_info`` is given."""
     cases, mixed = found_cases(out), mixed_settings(out)
-    found, whole = [case.result for case in cases], {} if mixed else overall(with_another(out, cases))
+    among = [] if mixed else with_another(out, cases)
+    found, whole = [case.result for case in cases], {} if mixed else overall(among)
     rows, (times, replayed_s) = [result.summary for result in found], _times(out, found)
     failures = [row for result in found for row in result.failures]
     for file, table, given in (
@@ -69,6 +70,7 @@ def aggregate(out: Path, run_info: dict[str, Any] | None = None, name: str = "ru
     if run_info is not None:
         assumed = [*run_info.get("assumptions", ()), *shared_scans(found), *strangers(found)]
         cases_of = {"assumptions": assumed, "cases": [result.case for result in found]}
+        cases_of["doubts"] = [*run_info.get("doubts", ()), *copies(among)]
         write_json(out / name, run_info | cases_of | {"overall": whole})
     pooled = [] if mixed else frames_of(validation(cases))
     points = np.concatenate([np.zeros(0), *(frame.error_mm for frame in pooled)])

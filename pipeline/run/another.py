@@ -27,6 +27,9 @@ NEAREST_MM = 2.0
 """How far off the nearest depth may be, at the least; else half as far as one of its frames is from the next: a trace
 that is farther off stands in for one that is missing, and what is lost would make the wire look better."""
 STEP_MM = 0.5
+ALIKE = 0.3
+"""Distance between two insertions' traces over their standard deviation, below which they are of one: two wires that
+lie alike are traced 1.4 times their standard deviation apart along each axis."""
 MOST_OTHERS = 24
 """Most traces in a guess, those of the nearest depths: with all of 500 cases in one phantom it would take ten minutes,
 and the root mean square over 24 is known to about a seventh of itself (1 / sqrt(48))."""
@@ -46,6 +49,28 @@ def with_another(out: Path, found: Sequence[Found]) -> list[Found]:
     traces = {case.result.case: _traces(out, case) for cases in shared for case in cases}
     skip_mm = _skip_mm(out, shared[0][0]) if shared else 0.0
     return [_with_another(c, own[c.result.case], traces, skip_mm) if c.result.case in own else c for c in found]
+
+
+def copies(found: Sequence[Found]) -> list[str]:
+    """A sentence for each two insertions whose traces lie nearer to each other than traces can.
+
+    found : of ``with_another``.
+    Scans of one wire, written again, are traced alike to a hundredth of a voxel; of two wires they never are.
+    """
+    said: dict[frozenset[str], str] = {}
+    for case in found:
+        rows = [frame for frame in case.frames.values() if frame.guesses]
+        sigma = float(np.median([frame.row.get("trace_sigma_mm") or math.nan for frame in rows] or [math.nan]))
+        for other in sorted({name for frame in rows for name in frame.guesses}):
+            squares, count = np.sum([frame.guesses[other] for frame in rows if other in frame.guesses], axis=0)
+            apart, both = float(np.sqrt(squares / count)), frozenset((case.insertion, other))
+            if apart < ALIKE * sigma and both not in said:
+                said[both] = (
+                    f"insertions {case.insertion!r} and {other!r} are traced to within {apart:.2g} mm of each other, "
+                    f"where traces are known to {sigma:.2g} mm: they are scans of one, and count as two; give their "
+                    "cases one group"
+                )
+    return [*said.values()]
 
 
 def _skip_mm(out: Path, case: Found) -> float:

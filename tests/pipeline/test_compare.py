@@ -283,14 +283,16 @@ def test_a_wire_that_lies_nearer_to_traces_than_these_are_known_is_no_news(
 
 
 @pytest.mark.parametrize(
-    ("off_mm", "tip_mm", "said"), [(0.05, 0.1, ""), (17.0, 48.0, "lie 17.0 mm from"), (1.4, 17.0, "end 17.0 mm from")]
+    ("off_mm", "tip_mm", "said"),
+    [(0.05, 0.1, ""), (17.0, 48.0, "lie 17 mm from"), (0.7, 0.7, "lie 0.7 mm from"), (0.1, 4.5, "frame 2: 4.5 mm")],
 )
 def test_a_truth_that_lies_elsewhere_is_no_truth(off_mm: float, tip_mm: float, said: str) -> None:
     """One in RAS gave trace_tip_mm of 48 mm beside wires that agreed to 0.07 mm, without a word; then one of other
-    frames, whose wires lie beside these and end elsewhere.
+    frames, whose wires lie beside these and end elsewhere; then one moved by a voxel, and two frames exchanged.
     """
     curve = Curve(np.array([[0.0, 0, 0], [0, 0, 1]]), np.full(2, 0.05))
-    frames = [Frame(n, curve=curve, truth={"trace_mean_mm": off_mm, "trace_tip_mm": tip_mm}) for n in range(3)]
-    warnings = _truth_elsewhere([*frames, Frame(3)])
+    frames = [Frame(n, curve=curve, truth={"trace_mean_mm": off_mm, "trace_tip_mm": off_mm}) for n in range(3)]
+    frames[2].truth["trace_tip_mm"] = tip_mm
+    warnings = _truth_elsewhere([*frames, Frame(3)], 0.75)
     assert len(warnings) == bool(said)
     assert all(said in text for text in warnings)

@@ -9,7 +9,7 @@ import pytest
 
 from pipeline.model import Curve
 from pipeline.run.log import Log
-from pipeline.run.stages.depths import in_step, shrinking, standing, turned_round
+from pipeline.run.stages.depths import in_step, shrinking, standing, stated_elsewhere, turned_round
 from pipeline.run.stages.dim_ends import own_dim_ends
 from pipeline.run.stages.known import Frame
 from pipeline.run.stages.repeated import once
@@ -45,6 +45,15 @@ def test_a_scale_that_is_off_or_read_by_hand_is_no_fault() -> None:
     by_hand = [d + rng.normal(scale=0.4) for d in DEPTHS]
     for lengths in (drift, by_hand):
         assert all(f.ok for f in in_step(frames(lengths, DEPTHS), 0.3))
+
+
+def test_depths_counted_from_elsewhere_are_a_warning() -> None:
+    """1.5 mm in every frame, within the tolerance of each: 16 of 18 ok, and nothing was said."""
+    (said,) = stated_elsewhere(frames([d - 1.5 for d in DEPTHS], DEPTHS), 2.0)
+    assert said.startswith("the traced wires are 1.5 mm shorter than insertion_mm states (median of 6 frames)")
+    assert stated_elsewhere(frames([d - 0.4 for d in DEPTHS], DEPTHS), 2.0) == []
+    assert stated_elsewhere(frames([d - 1.5 for d in DEPTHS[:3]], DEPTHS[:3]), 2.0) == []
+    assert stated_elsewhere(frames(DEPTHS, [float("nan")] * 6), 2.0) == []
 
 
 def test_too_few_frames_or_no_depths_say_nothing() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -12,8 +13,11 @@ from scipy.interpolate import CubicSpline
 
 from pipeline.arrays.polyline import resample, to_length
 from pipeline.cli import main
-from pipeline.model import arc_length
+from pipeline.model import Curve, arc_length
+from pipeline.run.stages.beside import beside_what_is_seen
+from pipeline.run.stages.known import Frame
 from pipeline.run.stages.own_curves import CORNER_VOXELS, LONGER, corner_mm, known_by_tip, zigzag
+from pipeline.trace.config import TraceConfig
 from tests.pipeline.known_study import MANIFEST, QUICK, Array, errors_of, peers, write_csv, write_study
 
 WIRES = peers("bend")
@@ -184,3 +188,21 @@ def test_score_says_what_the_curves_are_doubted_for(tmp_path: Path, capsys: pyte
     told = capsys.readouterr()
     assert "few points" in told.err
     assert "few points" not in told.out
+
+
+@pytest.mark.parametrize(
+    ("own", "said"),
+    [
+        (lambda points: points + [0.2, 0.0, 0.0], "all shifted by about [0.2, 0.0, 0.0] mm (LPS)"),
+        (lambda points: points * 1.05, "1.25 mm longer in the median"),
+        (lambda points: points + [0.05, 0.0, 0.0], ""),
+    ],
+)
+def test_curves_that_are_all_a_little_off_are_told(own: Callable[[Array], Array], said: str) -> None:
+    """By half a voxel in every frame, or 5 % too long: each was within its limits, and nothing was said."""
+    wires = [np.stack([np.zeros(40), np.zeros(40), np.linspace(0.0, mm, 40)], axis=1) for mm in (20.0, 25.0, 30.0)]
+    seen = [Curve(wire, np.full(40, 0.03)) for wire in wires]
+    frames = [Frame(n, curve=Curve(own(wire), np.full(40, 0.03))) for n, wire in enumerate(wires)]
+    warnings = beside_what_is_seen(frames, seen, TraceConfig(), 0.4)
+    assert len(warnings) == bool(said)
+    assert all(said in text for text in warnings)

@@ -19,7 +19,7 @@ import SimpleITK as sitk
 
 from pipeline.cli import main
 from pipeline.run import ledger
-from pipeline.run.another import with_another
+from pipeline.run.another import copies, with_another
 from pipeline.run.overall import found_cases, phantoms_of, strangers
 
 INSERTIONS, FRAMES = 3, 4
@@ -260,6 +260,25 @@ def test_a_lost_trace_makes_no_guess_worse(out: Path) -> None:
     # nor does what is lost of every second frame make those that are left farther apart
     half = [replace(c, traced_mm={n: d for n, d in c.traced_mm.items() if n % 2 == 0}) for c in found]
     assert not with_another(out, [found[0], *half[1:]])[0].frames[1].guesses
+
+
+def test_scans_of_one_wire_under_several_names_are_told(out: Path) -> None:
+    """Written again with other noise they were three insertions: a narrow interval, and a predictor that is a copy."""
+    found = with_another(out, found_cases(out))
+    assert copies(found) == []
+    alike = [
+        replace(
+            case,
+            frames={
+                n: f._replace(guesses={name: (count * 1e-5, count) for name, (_, count) in f.guesses.items()})
+                for n, f in case.frames.items()
+            },
+        )
+        for case in found
+    ]
+    said = copies(alike)
+    assert len(said) == INSERTIONS * (INSERTIONS - 1) // 2
+    assert all("traced to within 0.0032 mm of each other" in text for text in said)
 
 
 def test_what_the_wire_ends_with_is_pooled_over_its_points(out: Path) -> None:

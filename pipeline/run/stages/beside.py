@@ -1,11 +1,13 @@
 """The user's own curves beside the wires that the scans show: one of another frame, or moved, is not passed over."""
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
+from pipeline.arrays.polyline import at_arc
 from pipeline.compare.metrics import point_to_curve
-from pipeline.model import Curve
+from pipeline.model import Array, Curve
 from pipeline.run.stages.known import Frame
 from pipeline.status import FrameStatus
 from pipeline.trace.config import TraceConfig
@@ -13,7 +15,20 @@ from reports.case_files import listed
 
 OFF_VOXELS, OFF_SIGMAS = 0.75, 3.0
 """Median distance from a traced wire, in voxels and in its own standard deviations, above which a curve is not its."""
+ALL_VOXELS, FEWEST = 0.35, 3
+"""Shift, and twice the length, by which all curves are off together: voxels. Frames from which that is asked; what
+differs from frame to frame cancels in their median, as noise does."""
 MOST_NAMED = 6
+
+
+class _Off(NamedTuple):
+    """How far an own curve lies from the wire that a frame shows, mm: median distance, mean shift (3,), more length."""
+
+    frame: int
+    away: float
+    sigma: float
+    shift: Array
+    longer: float
 
 
 def beside_what_is_seen(
@@ -23,20 +38,41 @@ def beside_what_is_seen(
 
     seen : of each frame the wire that its scan shows; None where the curve of the frame is that very one.
     """
-    said = {}
-    for frame, wire in zip(frames, seen, strict=True):
-        if wire is None or wire.status is not FrameStatus.OK or frame.curve is None or not frame.traced:
-            continue
-        away = point_to_curve(wire.points_mm, frame.curve.points_mm)[0]
-        off, longer = float(np.median(away)), frame.curve.length_mm - wire.length_mm
-        if off > max(OFF_VOXELS * voxel_mm, OFF_SIGMAS * float(np.median(wire.sigma_mm))):
-            said[frame.index] = f"{off:.2f} mm off"
-        elif abs(longer) > config.length_tolerance_mm:
-            said[frame.index] = f"{abs(longer):.1f} mm {'longer' if longer > 0 else 'shorter'}"
-    if not said:
-        return []
-    each = listed([f"frame {index}: {what}" for index, what in said.items()], MOST_NAMED)
-    return [
-        f"the manifest's own curves are not where the scans show the wire ({each}): check which curve belongs to "
-        "which frame, its units and LPS; without the key traces the scans are traced"
+    both = [
+        _off(frame, frame.curve, wire)
+        for frame, wire in zip(frames, seen, strict=True)
+        if wire is not None and wire.status is FrameStatus.OK and frame.curve is not None and frame.traced
     ]
+    said = {}
+    for one in both:
+        if one.away > max(OFF_VOXELS * voxel_mm, OFF_SIGMAS * one.sigma):
+            said[one.frame] = f"{one.away:.2f} mm off"
+        elif abs(one.longer) > config.length_tolerance_mm:
+            said[one.frame] = f"{abs(one.longer):.1f} mm {'longer' if one.longer > 0 else 'shorter'}"
+    each = listed([f"frame {index}: {what}" for index, what in said.items()], MOST_NAMED)
+    found = [each] * bool(said) + (_together(both, voxel_mm) if 2 * len(said) < len(both) else [])
+    return [
+        f"the manifest's own curves are not where the scans show the wire ({what}): check which curve belongs to "
+        "which frame, its units and LPS; without the key traces the scans are traced"
+        for what in found
+    ]
+
+
+def _off(frame: Frame, own: Curve, wire: Curve) -> _Off:
+    away, foot = point_to_curve(wire.points_mm, own.points_mm)
+    shift = np.mean(at_arc(own.points_mm, foot) - wire.points_mm, axis=0)
+    sigma = float(np.median(wire.sigma_mm))
+    return _Off(frame.index, float(np.median(away)), sigma, shift, own.length_mm - wire.length_mm)
+
+
+def _together(both: Sequence[_Off], voxel_mm: float) -> list[str]:
+    """By how much all curves are off alike, which in each frame alone is little."""
+    if len(both) < FEWEST:
+        return []
+    shift, longer = np.median([one.shift for one in both], axis=0), float(np.median([one.longer for one in both]))
+    said = []
+    if np.linalg.norm(shift) > ALL_VOXELS * voxel_mm:
+        said.append(f"all shifted by about {shift.round(2).tolist()} mm (LPS)")
+    if abs(longer) > 2.0 * ALL_VOXELS * voxel_mm:
+        said.append(f"{abs(longer):.2f} mm {'longer' if longer > 0 else 'shorter'} in the median")
+    return [", ".join(said)] * bool(said)

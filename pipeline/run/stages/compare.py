@@ -11,6 +11,7 @@ from pipeline.compare.metrics import rms
 from pipeline.compare.nulls import Clues, Seen, score
 from pipeline.model import Array, Curve
 from pipeline.run.log import Log
+from pipeline.run.stages.beside import MOST_NAMED
 from pipeline.run.stages.budget import budgeted
 from pipeline.run.stages.contradicted import contradicted, from_traces
 from pipeline.run.stages.entries import four_entries, replayed_entries
@@ -20,7 +21,7 @@ from pipeline.run.stages.rivals import rival_ways, rival_wires, simulated_rivals
 from pipeline.run.stages.views import compare_in_views
 from pipeline.simulate.clamp import ahead_of
 from pipeline.status import FrameStatus
-from reports.case_files import MADE_FROM_TRACES
+from reports.case_files import MADE_FROM_TRACES, listed
 from solver import Solution
 
 
@@ -37,7 +38,11 @@ def compare_frames(run: Context, known: Known) -> Known:
         clues.known_ways()
     frames, entries = _all_compared(run, known, clues, simulated, entered)
     known = replace(known, frames=frames, entries=entries)
-    run.log.warnings += [*_too_near(known.frames), *_truth_elsewhere(known.frames), *_rough_truth(known)]
+    run.log.warnings += [
+        *_too_near(known.frames),
+        *_truth_elsewhere(known.frames, _voxel_mm(known)),
+        *_rough_truth(known),
+    ]
     return budgeted(run, known)
 
 
@@ -111,29 +116,38 @@ NEAREST = 0.2
 
 NEAREST_MM = 0.01
 """The same where the curves are the user's own, of unknown standard deviation: no scan shows a wire so well."""
-TRUTH_MM = 2.0
-"""Distance of traced wires from the true ones, median of the frames' means, from which they are not the same wires."""
+TRUTH_VOXELS, TRUTH_TIP_VOXELS = 0.5, 3.0
+"""Distance of traced wires from the true ones, median of the frames' means, and of the tips in any frame, voxels, from
+which they are not the same wires: traces lie within 0.1 voxel of the true wire, tips within one."""
 
 
-def _truth_elsewhere(frames: Sequence[Frame]) -> list[str]:
+def _truth_elsewhere(frames: Sequence[Frame], voxel_mm: float) -> list[str]:
     """A warning where the true wires of a synthetic study lie elsewhere than the traced ones."""
-    known = [f.truth for f in frames if f.trusted_curve is not None and "trace_mean_mm" in f.truth]
-    off, tips = (np.median([one[name] for one in known] or 0.0) for name in ("trace_mean_mm", "trace_tip_mm"))
-    if not max(off, tips) > TRUTH_MM:
-        return []
-    where = f"lie {off:.1f} mm" if off > TRUTH_MM else f"end {tips:.1f} mm"
+    known = [f for f in frames if f.trusted_curve is not None and "trace_mean_mm" in f.truth]
+    off = float(np.median([f.truth["trace_mean_mm"] for f in known] or 0.0))
+    tips = {f.index: f.truth["trace_tip_mm"] for f in known if f.truth["trace_tip_mm"] > TRUTH_TIP_VOXELS * voxel_mm}
+    said = []
+    if off > TRUTH_VOXELS * voxel_mm:
+        said.append(f"the true wires lie {off:.2g} mm from the traced ones (median of the frames)")
+    elif tips:
+        each = listed([f"frame {index}: {mm:.1f} mm" for index, mm in tips.items()], MOST_NAMED)
+        said.append(f"true wires end elsewhere than the traced ones ({each})")
     return [
-        f"the true wires {where} from the traced ones (median of the frames): is truth in mm, in LPS, and of these "
-        "frames? the columns of the truth say nothing before that"
+        f"{text}: is truth in mm, in LPS, and of these frames? the columns of the truth say nothing before that"
+        for text in said
     ]
 
 
 def _rough_truth(known: Known) -> list[str]:
     """A warning of true wires whose points are so far apart that they cut corners."""
-    if known.lumen is None:
-        return []
     wires = {f.index: f.truth_mm for f in known.frames if f.truth_mm is not None}
-    return rough(wires, float(min(known.lumen.distance.spacing_mm)), "the true wires", "give a point every millimetre")
+    return rough(wires, _voxel_mm(known), "the true wires", "give a point every millimetre")
+
+
+def _voxel_mm(known: Known) -> float:
+    """The least edge of the voxels of the lumen, without which nothing is compared."""
+    assert known.lumen is not None
+    return float(min(known.lumen.distance.spacing_mm))
 
 
 def _too_near(frames: Sequence[Frame]) -> list[str]:

@@ -16,6 +16,8 @@ AROUND = 5
 """Number of neighbouring frames whose median difference of traced length and stated depth is the usual one."""
 FEWEST = 4
 """Fewest frames for a check."""
+ALIKE = 0.8
+"""Share of the frames that are off to one side, from which depths are counted from elsewhere."""
 SURE = 5.0
 """First limit on how far a difference may be off the usual one: so many standard deviations of all frames."""
 SURE_TIP = 4.0
@@ -44,6 +46,25 @@ def in_step(frames: Sequence[Frame], voxel_mm: float) -> list[Frame]:
         )
         out[known[n]] = frames[known[n]].failed("trace", FrameStatus.LENGTH_MISMATCH, note)
     return out
+
+
+def stated_elsewhere(frames: Sequence[Frame], tolerance_mm: float) -> list[str]:
+    """A warning where all traces are about as much shorter, or longer, than insertion_mm states.
+
+    tolerance_mm : by how much a frame alone may be.
+    """
+    apart = [c.length_mm - f.expected_mm for f in frames if (c := f.trusted_curve) is not None]
+    known = np.array([mm for mm in apart if np.isfinite(mm)])
+    if len(known) < FEWEST or not abs(np.median(known)) > 0.5 * tolerance_mm:
+        return []
+    usual = float(np.median(known))
+    if np.mean(known * usual > 0) < ALIKE:
+        return []
+    return [
+        f"the traced wires are {abs(usual):.1f} mm {'longer' if usual > 0 else 'shorter'} than insertion_mm states "
+        f"(median of {len(known)} frames): check from where depths were counted, and entry_mm; the simulated wires "
+        "go as deep as the traced ones, unless simulate.depth is manifest"
+    ]
 
 
 def turned_round(frames: Sequence[Frame]) -> list[Frame]:
