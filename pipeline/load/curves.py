@@ -18,7 +18,8 @@ from pipeline.model import Array, Curve
 
 CURVE_BYTES = 16 * 2**20
 """Longest table of a curve: 200,000 points."""
-_NAMES = (("x_mm", "y_mm", "z_mm"), ("x", "y", "z"))
+_NAMES = (("x_mm", "y_mm", "z_mm"), ("x", "y", "z"), ("points:0", "points:1", "points:2"))
+"""Of the columns of points, in small letters; the last are ParaView's."""
 
 
 def markups_in(path: Path) -> list[dict[str, Any]]:

@@ -147,7 +147,7 @@ def _unstated(missing: Sequence[str], kind: str) -> str:
     keys = ", ".join(f"{what} = {USUAL[what]!r}" for what in missing)
     lines = " and ".join(f"'# {what}: {USUAL[what]}'" for what in missing)
     also = f"; or write {lines} above the table; columns x_mm, y_mm, z_mm say LPS mm" * (kind == ".csv")
-    return f"{are}; say {say}, or {keys} in the manifest's simulated{also}"
+    return f"{are}; say {keys} in the manifest's simulated, or {say} to `wireval score`{also}"
 
 
 def _checked(name: str, points: Array) -> OtherFile:

@@ -240,7 +240,9 @@ def test_curves_come_back_as_they_were_written(tmp_path):
     lines = [",".join(map(str, p)) for p in points]
     (tmp_path / "a.csv").write_text("\n".join(["x_mm,y_mm,z_mm", *lines]), encoding="utf-8")
     (tmp_path / "bare.csv").write_text("\n".join(lines), encoding="utf-8")
-    for name in ("a.vtp", "a.mrk.json", "a.csv", "bare.csv"):
+    of_paraview = ['"Radius","Points:0","Points:1","Points:2"', *(f"0.2,{line}" for line in lines)]
+    (tmp_path / "of_paraview.csv").write_text("\n".join(of_paraview), encoding="utf-8")
+    for name in ("a.vtp", "a.mrk.json", "a.csv", "bare.csv", "of_paraview.csv"):
         np.testing.assert_allclose(read_curve(tmp_path / name).points_mm, points, rtol=0.0, atol=1e-6)
 
 
