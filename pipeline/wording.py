@@ -45,9 +45,10 @@ def sentences(error: ValidationError, data: Any, schema: Schema) -> Iterator[tup
         elif item["type"] != "default_factory_not_called":  # it depends on another key, which has an error of its own
             groups.setdefault(_key_of(place), []).append((place, item))
     for key_place, items in groups.items():
-        own = next((item["msg"] for _, item in items if item["type"] == OWN), "")
-        if own:
-            yield key_place, f": {own.removeprefix('Value error, ')}"
+        owns = [(place, item["msg"]) for place, item in items if item["type"] == OWN]
+        if owns:
+            # of a whole table in a list, a case, its number tells which
+            yield from ((place, f": {m.removeprefix('Value error, ')}") for place, m in owns)
         else:
             place = max((place for place, _ in items), key=len)
             yield _refused(data, key_place, place, schema)

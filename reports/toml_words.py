@@ -16,7 +16,7 @@ ALLOWED = {
     "overwrite": "a key stands once in its table",
     "Cannot declare": "a table stands once; only [[case]] is repeated",
     "mutate": "a table stands once, in one place",
-    "Unclosed array": "a list ends with ]",
+    "Unclosed array": "a list has commas between its parts and ends with ]",
     "string": "a text ends with the quote it begins with, on its line; \\\\ stands for a backslash",
     "Illegal character": "a text ends with the quote it begins with, on its line",
     "escape": "in double quotes \\\\ stands for a backslash; single quotes take it as it is",

@@ -17,7 +17,7 @@ from pipeline.run import ledger
 from pipeline.run.results import Result, found_results, lost, untold
 from pipeline.run.stages.known import UP_TO_TRACE
 from reports import tables
-from reports.case_files import find_cases
+from reports.case_files import counted, find_cases
 from reports.schema import ERRORS, POINTS
 
 ALL = "(all)"
@@ -131,10 +131,10 @@ def _scored(folder: Path, result: Result, insertion: str) -> tuple[dict[int, Sco
     rows = [{str(k): None if v is pd.NA or v != v else v for k, v in row.items()} for row in errors.to_dict("records")]
     mine = [own[row["frame"]] for row in rows]
     scored = [Scored(row, error[m], arc[m], insertion, case=result.case) for row, m in zip(rows, mine, strict=True)]
-    counted = {int(one.row["frame"]): one for one in scored if is_pooled(one.row, one.error_mm)}
+    pooled = {int(one.row["frame"]): one for one in scored if is_pooled(one.row, one.error_mm)}
     trusted = {frame["frame"] for frame in result.frames if frame.get("stage") not in UP_TO_TRACE}
     known = errors[errors["frame"].isin(trusted) & errors["insertion_mm"].notna()]
-    return counted, dict(zip(known["frame"].astype(int), known["insertion_mm"].astype(float), strict=True))
+    return pooled, dict(zip(known["frame"].astype(int), known["insertion_mm"].astype(float), strict=True))
 
 
 def validation(found: Sequence[Found]) -> list[Found]:
@@ -181,7 +181,7 @@ class Ratio:
     def sentence(self) -> str:
         """One line for a reader."""
         known = intervals.in_words(self.low, self.high, self.note)
-        return f"rms of the second run / the first, on {self.frames} frames: {self.value:.3f} ({known})"
+        return f"rms of the second run / the first, on {counted(self.frames, 'frame')}: {self.value:.3f} ({known})"
 
     def verdict(self, allowed: float = 1.0, caveat: str = "") -> str:
         """The sentence, and what may be concluded from it.

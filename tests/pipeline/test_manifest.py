@@ -146,6 +146,8 @@ def test_a_clamp_cannot_be_borrowed_from_nowhere_or_in_a_ring(tmp_path: Path) ->
     )
     assert "shows no clamp" in problems(tmp_path, f'{GOOD}\nentry = "case:run1"\n')
     assert "unknown key" in problems(tmp_path, f"{GOOD}\nentry_case = {{}}\n")
+    second = GOOD[GOOD.index("[[case]]") :].replace('frames = "frames/*.mha"\n', "").replace("run1", "run2")
+    assert "case 'run2': neither frames nor insertion_mm" in problems(tmp_path, f"{GOOD}{second}")
 
 
 @pytest.mark.parametrize(

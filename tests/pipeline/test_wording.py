@@ -158,7 +158,7 @@ def test_projections_and_parameters_speak_alike(tmp_path: Path) -> None:
         ("a = 1\nb =", "f.toml, line 2: b =: not valid TOML; a value is a number"),
         ('a = "x', 'f.toml, line 1: a = "x: not valid TOML; a text ends with the quote'),
         ("a = 1\na = 2", "f.toml, line 2: a = 2: not valid TOML; a key stands once"),
-        ("a = [1,\n2", "f.toml, line 2: 2: not valid TOML; a list ends with ]"),
+        ("a = [1,\n2", "f.toml, line 2: 2: not valid TOML; a list has commas between its parts and ends with ]"),
         ("a 1", "f.toml, line 1: a 1: not valid TOML; a line is key = value"),
     ],
 )
