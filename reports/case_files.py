@@ -225,7 +225,7 @@ def not_reached(out_dir: Path) -> str:
 
 
 def doubted(out_dir: Path) -> list[str]:
-    """What the runs into a folder found doubtful in their manifests, each sentence once."""
+    """What the runs into a folder found doubtful among their cases, each sentence once."""
     return list(dict.fromkeys(str(text) for run in _runs(out_dir) for text in run.get("doubts", ())))
 
 

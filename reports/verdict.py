@@ -224,14 +224,14 @@ def worst_frames(tables: Mapping[str, pd.DataFrame], links: Mapping[str, str]) -
 
 
 def warned(out_dir: Path) -> list[str]:
-    """What is doubtful in a run's manifest, and what was warned of in its cases, a line each text, no more than a few.
+    """What is doubtful among the cases of a run, and what was warned of in each, a line each text, of these a few.
 
     Once for all cases that say it: on a screen of 30 lines the failures above are to stay in sight.
     """
-    said = [*doubted(out_dir), *said_by_cases(results_in(out_dir), "warnings")]
-    lines = [f"warning: {text}" for text in said]
+    lines = [f"warning: {text}" for text in said_by_cases(results_in(out_dir), "warnings")]
     rest = len(lines) - _MANY
-    return [*lines[:_MANY], *[f"{counted(rest, 'more warning')} on the pages of the cases"] * (rest > 0)]
+    more = [f"{counted(rest, 'more warning')} on the pages of the cases"] * (rest > 0)
+    return [*(f"warning: {text}" for text in doubted(out_dir)), *lines[:_MANY], *more]
 
 
 def typed(folder: Path) -> Sequence[str]:

@@ -52,25 +52,27 @@ def with_another(out: Path, found: Sequence[Found]) -> list[Found]:
 
 
 def copies(found: Sequence[Found]) -> list[str]:
-    """A sentence for each two insertions whose traces lie nearer to each other than traces can.
+    """A sentence for each two insertions whose traces lie nearer to each other than traces of two scans can.
 
-    found : of ``with_another``.
-    Scans of one wire, written again, are traced alike to a hundredth of a voxel; of two wires they never are.
+    found : of ``with_another``. A scan that was written again (another format, rounded, with a grey more of noise) is
+    traced alike to a hundredth of a voxel; two scans of one wire are not, as each has noise of its own.
     """
-    said: dict[frozenset[str], str] = {}
+    pairs: dict[tuple[str, ...], list[tuple[float, float]]] = {}
     for case in found:
         rows = [frame for frame in case.frames.values() if frame.guesses]
         sigma = float(np.median([frame.row.get("trace_sigma_mm") or math.nan for frame in rows] or [math.nan]))
         for other in sorted({name for frame in rows for name in frame.guesses}):
             squares, count = np.sum([frame.guesses[other] for frame in rows if other in frame.guesses], axis=0)
-            apart, both = float(np.sqrt(squares / count)), frozenset((case.insertion, other))
-            if apart < ALIKE * sigma and both not in said:
-                said[both] = (
-                    f"insertions {case.insertion!r} and {other!r} are traced to within {apart:.2g} mm of each other, "
-                    f"where traces are known to {sigma:.2g} mm: they are scans of one, and count as two; give their "
-                    "cases one group"
-                )
-    return [*said.values()]
+            pairs.setdefault(tuple(sorted((case.insertion, other))), []).append(
+                (float(np.sqrt(squares / count)), sigma)
+            )
+    farthest = {both: max(ways) for both, ways in pairs.items()}
+    return [
+        f"insertions {one!r} and {other!r} are traced to within {apart:.2g} mm of each other, where traces are known "
+        f"to {sigma:.2g} mm: they are one scan, written again, and count as two; give their cases one group"
+        for (one, other), (apart, sigma) in farthest.items()
+        if apart < ALIKE * sigma
+    ]
 
 
 def _skip_mm(out: Path, case: Found) -> float:

@@ -32,7 +32,7 @@ from pipeline.run.workers import NO_LIMITS, Limits
 from pipeline.status import UsageError, did_you_mean
 from pipeline.study.check import frames_of
 from pipeline.study.manifest import Case, Manifest
-from pipeline.study.plausible import doubts
+from pipeline.study.same_scans import continued
 from pipeline.study.settings import to_toml
 from reports.atomic import WriteError, remove_leftovers, write_text, writing
 from reports.case_files import counted, left_over
@@ -145,7 +145,7 @@ def launch(plan: Plan) -> tuple[Totals, Path]:
     info: dict[str, Any] = {"manifest": str(manifest), "manifest_sha256": file_hash(manifest)}
     heads = heads_of(settings, plan.cases, plan.points)
     info |= {"sweep": heads, "swept": sorted(plan.ids) if heads else [], "until": plan.template.until}
-    info |= {"planned": [case.id for case in plan.manifest.cases], "doubts": [*doubts(plan.cases, settings.config)]}
+    info |= {"planned": [case.id for case in plan.manifest.cases], "doubts": continued(plan.manifest.cases)}
     name = f"run.{plan.shard.replace('/', '-')}.json" if plan.shard else "run.json"
     info |= {"left_out": _never_asked(out / name, plan.left_out), "config": settings.as_dict()}
     try:

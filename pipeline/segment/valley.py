@@ -7,6 +7,7 @@ it goes on both ways.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +21,7 @@ from pipeline.segment.thin import SKIRT
 from solver.grid import Array, Grid
 
 BRIGHT = 0.95
-"""Share of a branch's voxels that are darker than what counts as its grey: most lie on its flanks."""
+"""Quantile of its voxels' grey that counts as a branch's: most lie on its flanks."""
 HELD = 0.75
 """Share of a branch's grey that is found all the way to the vessel. Between tubes of 1.7 voxels radius, blurred by 0.8
 voxel, it falls to 0.4 of the thin one's over a gap of 1.7 voxels."""
@@ -30,13 +31,15 @@ NEAR = SKIRT + 1.0
 """Voxels from the vessel up to which a branch may be leading into it."""
 WINDOW = 18
 """Voxels around such a place that are looked at."""
+MOST_TRIED = 12
+"""Such places of a branch that are looked at, the nearest first: a root is among these."""
 BOTH_WAYS = 5.0
 """How far a branch goes on both ways from there if it passes by: a root is two voxels deep."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Low:
-    """What is connected to a vessel at the faintest grey: voxels, flat and as (n, 3), and which are the vessel's."""
+    """What is connected to a vessel at the faintest grey: its voxels, flat and (n, 3), and which are the vessel's."""
 
     grid: Grid
     region: Region
@@ -52,6 +55,7 @@ def with_own(grid: Grid, low: Index, region: Region, branches: list[Index]) -> R
     """
     if not branches:
         return region
+    low = np.sort(low)
     all_of = _Low(grid, region, low, unflattened(low, grid.shape), np.isin(low, region.voxels))
     tree = cKDTree(all_of.places[all_of.of_vessel])
     own, others = [region.thin], []
@@ -81,7 +85,8 @@ def _leads_in(low: _Low, vessel: cKDTree, branch: Index) -> bool:
     """Whether a branch, voxels (n, 3), leads into the vessel anywhere; true, too, where it is nowhere near."""
     away = np.asarray(vessel.query(branch)[0])
     near = away <= max(NEAR, float(away.min()))
-    return any(not _passes_by(low, branch, place) for place in _apart(branch[near], away[near]))
+    places = islice(_apart(branch[near], away[near]), MOST_TRIED)
+    return any(not _passes_by(low, branch, place) for place in places)
 
 
 def _apart(points: Index, away: Array) -> Iterator[Index]:
@@ -99,15 +104,17 @@ def _passes_by(low: _Low, branch: Index, place: Index) -> bool:
     here = branch[_within(branch, first, last)]
     if not _goes_both_ways(here - place, _at_edge(here, low.grid.shape)):
         return False
-    near = _within(low.places, first, last)
+    slab = slice(*np.searchsorted(low.flat, np.array([first[0], last[0]]) * int(np.prod(low.grid.shape[1:]))))
+    near = _within(low.places[slab], first, last)
+    flat, places, of_vessel = (of[slab][near] for of in (low.flat, low.places, low.of_vessel))
     levels = low.region.levels
-    seen = smooth_voxels(low.grid.values, low.region.taps, low.flat[near])
+    seen = smooth_voxels(low.grid.values, low.region.taps, flat)
     share = np.zeros(last - first, np.float32)
-    share[tuple((low.places[near] - first).T)] = (seen - levels.outside) / levels.contrast
+    share[tuple((places - first).T)] = (seen - levels.outside) / levels.contrast
     own = share[tuple((here - first).T)]
     least = HELD * np.quantile(own, BRIGHT)
     number = np.asarray(label(share >= least, connectivity=3))
-    vessel = np.setdiff1d(number[tuple((low.places[near & low.of_vessel] - first).T)], 0)
+    vessel = np.setdiff1d(number[tuple((places[of_vessel] - first).T)], 0)
     return bool(np.mean(np.isin(number[tuple((here - first).T)], vessel)[own >= least]) < CONNECTED)
 
 

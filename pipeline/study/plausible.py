@@ -101,6 +101,10 @@ SHALLOWEST_MM, LONGEST_WAY = 1.0, 5.0
 """Least depth that an insertion reaches, and most times that a vessel's way may be as long as its scan's diagonal."""
 
 
+BACK_MM = 0.5
+"""Fall of the depth from frame to frame that is more than how it was read or rounded."""
+
+
 def odd_depths(case: Case, header: Header | None) -> list[str]:
     """Sentences where the stated depths are in another unit than mm, or go down. header : of a scan of the case."""
     if not case.insertion_mm:
@@ -109,9 +113,10 @@ def odd_depths(case: Case, header: Header | None) -> list[str]:
 
 
 def _drawn_back(depths: Sequence[float]) -> list[str]:
-    """A sentence where depths go down: what friction and the way there do to the wire is replayed as they say."""
-    back = np.flatnonzero(np.diff(depths) < 0.0)
-    if not len(back):
+    """A sentence where depths go down, but for a wire that is pushed in and drawn back once."""
+    deepest = int(np.argmax(depths))
+    back = np.flatnonzero(np.diff(depths) < -BACK_MM)
+    if not len(back) or (deepest > 0 and back[0] >= deepest and np.all(np.diff(depths)[deepest:] <= BACK_MM)):
         return []
     first = int(back[0])
     more = f" ({len(back)} times)" if len(back) > 1 else ""

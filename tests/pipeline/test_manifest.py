@@ -188,6 +188,9 @@ def test_depths_that_go_down_are_a_warning(tmp_path: Path) -> None:
     (case,) = read_manifest(written(tmp_path, text)).cases
     (said,) = odd_depths(case, None)
     assert said.startswith("insertion_mm goes down from 39 mm (frame 1) to 20 mm (2 times): ")
+    for depths, count in (("[10, 20, 30, 20, 10]", 0), ("[10, 20, 19.9, 30]", 0), ("[30, 20, 10]", 1)):
+        (case,) = read_manifest(written(tmp_path, text.replace("[14, 39, 20, 21, 8]", depths))).cases
+        assert len(odd_depths(case, None)) == count
 
 
 @pytest.mark.parametrize(("radius_mm", "modulus_gpa"), [(0.18, 9.5), (0.444, 9.5), (0.444, 158.4), (0.1, 60.0)])

@@ -7,6 +7,7 @@ import os
 import re
 import shutil
 import subprocess
+import tomllib
 from dataclasses import replace
 from pathlib import Path
 
@@ -248,11 +249,22 @@ def test_what_is_doubtful_in_a_manifest_is_said_by_the_run_itself(
     study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Only `check` and a dry run said it, which nobody has to call; -q hides no warning."""
-    folder, out = edited(study, tmp_path / "study", "radius_mm = 0.18", "radius_mm = 0.51"), tmp_path / "out"
-    assert run(folder, out, "-q", "--until", "segment") == 0
-    said = "radius_mm = 0.51: guide wires have 0.1 to 0.5 mm"
-    assert said in capsys.readouterr().err
-    assert said in (out / "index.html").read_text(encoding="utf-8")
+    folder, out = tmp_path / "study", tmp_path / "out"
+    shutil.copytree(study, folder)
+    text = (folder / "manifest.toml").read_text(encoding="utf-8")
+    case = tomllib.loads(text)["case"][0]
+    head, body = text.split("[[case]]")
+    parts = []
+    for n, mm in enumerate(case["insertion_mm"][:2]):
+        part = body.replace('"frames/*.mha"', f'"frames/frame_{n:03d}.mha"').replace('truth = "truth.json"\n', "")
+        part = re.sub(r"insertion_mm = .*", f"insertion_mm = [{mm}]", part)
+        parts.append(part.replace('id = "bifurcation"', f'id = "part{n}"'))
+    (folder / "manifest.toml").write_text("[[case]]".join([head, *parts]), encoding="utf-8")
+    said = "depths that follow each other: they count as 2 insertions"
+    for words in ((), ("--only", "part1", "--resume")):
+        assert run(folder, out, "-q", "--until", "segment", *words) == 0
+        assert capsys.readouterr().err.count(said) == 1
+        assert said in (out / "index.html").read_text(encoding="utf-8")
 
 
 def test_a_bend_too_sharp_to_be_five_times_as_sharp_is_compared(study: Path, tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ import numpy as np
 from pipeline.arrays.polyline import at_arc
 from pipeline.compare.metrics import point_to_curve
 from pipeline.model import Array, Curve
+from pipeline.run.stages.depths import ALIKE
 from pipeline.run.stages.known import Frame
 from pipeline.status import FrameStatus
 from pipeline.trace.config import TraceConfig
@@ -15,9 +16,9 @@ from reports.case_files import listed
 
 OFF_VOXELS, OFF_SIGMAS = 0.75, 3.0
 """Median distance from a traced wire, in voxels and in its own standard deviations, above which a curve is not its."""
-ALL_VOXELS, FEWEST = 0.35, 3
-"""Shift, and twice the length, by which all curves are off together: voxels. Frames from which that is asked; what
-differs from frame to frame cancels in their median, as noise does."""
+ALL_VOXELS, ALL_LONGER, FEWEST = 0.35, 1.5, 3
+"""Shift and length, in voxels, by which all curves are off together, and frames from which that is asked. Noise cancels
+in their median; that tips in faint scans are seen a voxel short does not."""
 MOST_NAMED = 6
 
 
@@ -29,6 +30,7 @@ class _Off(NamedTuple):
     sigma: float
     shift: Array
     longer: float
+    tip_sigma: float
 
 
 def beside_what_is_seen(
@@ -62,17 +64,18 @@ def _off(frame: Frame, own: Curve, wire: Curve) -> _Off:
     away, foot = point_to_curve(wire.points_mm, own.points_mm)
     shift = np.mean(at_arc(own.points_mm, foot) - wire.points_mm, axis=0)
     sigma = float(np.median(wire.sigma_mm))
-    return _Off(frame.index, float(np.median(away)), sigma, shift, own.length_mm - wire.length_mm)
+    return _Off(frame.index, float(np.median(away)), sigma, shift, own.length_mm - wire.length_mm, wire.tip_sigma_mm)
 
 
 def _together(both: Sequence[_Off], voxel_mm: float) -> list[str]:
     """By how much all curves are off alike, which in each frame alone is little."""
     if len(both) < FEWEST:
         return []
-    shift, longer = np.median([one.shift for one in both], axis=0), float(np.median([one.longer for one in both]))
-    said = []
-    if np.linalg.norm(shift) > ALL_VOXELS * voxel_mm:
+    shift, longer = np.median([one.shift for one in both], axis=0), np.array([one.longer for one in both])
+    sigma, tip_sigma = np.nan_to_num(np.median([(one.sigma, one.tip_sigma) for one in both], axis=0))
+    usual, said = float(np.median(longer)), []
+    if np.linalg.norm(shift) > max(ALL_VOXELS * voxel_mm, OFF_SIGMAS * sigma):
         said.append(f"all shifted by about {shift.round(2).tolist()} mm (LPS)")
-    if abs(longer) > 2.0 * ALL_VOXELS * voxel_mm:
-        said.append(f"{abs(longer):.2f} mm {'longer' if longer > 0 else 'shorter'} in the median")
+    if abs(usual) > max(ALL_LONGER * voxel_mm, OFF_SIGMAS * tip_sigma) and np.mean(longer * usual > 0) >= ALIKE:
+        said.append(f"{abs(usual):.2f} mm {'longer' if usual > 0 else 'shorter'} in the median")
     return [", ".join(said)] * bool(said)

@@ -119,13 +119,20 @@ NEAREST_MM = 0.01
 TRUTH_VOXELS, TRUTH_TIP_VOXELS = 0.5, 3.0
 """Distance of traced wires from the true ones, median of the frames' means, and of the tips in any frame, voxels, from
 which they are not the same wires: traces lie within 0.1 voxel of the true wire, tips within one."""
+TIP_SIGMAS = 5.0
+"""The same for tips in their own standard deviations."""
 
 
 def _truth_elsewhere(frames: Sequence[Frame], voxel_mm: float) -> list[str]:
     """A warning where the true wires of a synthetic study lie elsewhere than the traced ones."""
     known = [f for f in frames if f.trusted_curve is not None and "trace_mean_mm" in f.truth]
     off = float(np.median([f.truth["trace_mean_mm"] for f in known] or 0.0))
-    tips = {f.index: f.truth["trace_tip_mm"] for f in known if f.truth["trace_tip_mm"] > TRUTH_TIP_VOXELS * voxel_mm}
+    least = TRUTH_TIP_VOXELS * voxel_mm
+    tips = {
+        f.index: mm
+        for f in known
+        if f.curve is not None and (mm := f.truth["trace_tip_mm"]) > max(least, TIP_SIGMAS * f.curve.tip_sigma_mm)
+    }
     said = []
     if off > TRUTH_VOXELS * voxel_mm:
         said.append(f"the true wires lie {off:.2g} mm from the traced ones (median of the frames)")
@@ -140,14 +147,15 @@ def _truth_elsewhere(frames: Sequence[Frame], voxel_mm: float) -> list[str]:
 
 def _rough_truth(known: Known) -> list[str]:
     """A warning of true wires whose points are so far apart that they cut corners."""
+    assert known.lumen is not None
     wires = {f.index: f.truth_mm for f in known.frames if f.truth_mm is not None}
-    return rough(wires, _voxel_mm(known), "the true wires", "give a point every millimetre")
+    return rough(wires, float(min(known.lumen.distance.spacing_mm)), "the true wires", "give a point every millimetre")
 
 
 def _voxel_mm(known: Known) -> float:
-    """The least edge of the voxels of the lumen, without which nothing is compared."""
+    """The largest edge of the voxels of the lumen, without which nothing is compared."""
     assert known.lumen is not None
-    return float(min(known.lumen.distance.spacing_mm))
+    return float(max(known.lumen.distance.spacing_mm))
 
 
 def _too_near(frames: Sequence[Frame]) -> list[str]:

@@ -45,21 +45,23 @@ def segment_vessel(run: Context, known: Known) -> Known:
     return replace(known, lumen=lumen)
 
 
-FAR_OUTSIDE = 2.0
-"""Voxels outside a given lumen from which an entry was not meant for it: one in its wall is the solver's to judge."""
+FAR_OUTSIDE, FAR_OUTSIDE_MM = 2.0, 1.5
+"""Voxels and mm outside a given lumen, the larger counts, from which an entry was not meant for it: one in its wall is
+the solver's to judge."""
 
 
 def _require_entry(run: Context, lumen: Lumen) -> None:
     """StageError where the user's own lumen is not where the wire enters: wires would be missed, not the lumen."""
     grid = lumen.distance
     out = float(outside_mm(grid, np.array([run.case.entry_mm]))[0])
-    if out > FAR_OUTSIDE * float(np.max(grid.spacing_mm)):
+    if out > max(FAR_OUTSIDE * float(np.max(grid.spacing_mm)), FAR_OUTSIDE_MM, 2.0 * (run.case.entry_sigma_mm or 0.0)):
         low, high = (corner.round(1).tolist() for corner in _box_of(lumen))
         raise failed(
             f"entry_mm {list(run.case.entry_mm)} lies {out:.1f} mm or more outside the given lumen, which spans {low} "
             f"to {high} mm in LPS",
             "a lumen that the wire enters",
-            "check its axes (LPS or RAS), its grid (was the scan's geometry kept?), its unit and which label is meant",
+            "check its axes (LPS or RAS), its grid (was the scan's geometry kept?), its unit, which label is meant, "
+            "and whether it reaches to the entry",
         )
 
 
