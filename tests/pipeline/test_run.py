@@ -721,7 +721,19 @@ def test_pages_of_many_cases_are_drawn_with_a_line_each(
     (out / "cases" / "bifurcation" / "frames.h5").write_bytes(b"")
     ledger.write(out / "cases" / "bifurcation", "key")
     assert main(["report", str(out)]) == 1
-    assert "bifurcation: its page cannot be drawn: " in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert "bifurcation: its page cannot be drawn: " in said
+    assert "bifurcation: drawn" not in said
+    monkeypatch.undo()
+    ledger.write(shutil.copytree(finished, tmp_path / "whole") / "cases" / "bifurcation", "key")
+    assert main(["report", str(tmp_path / "whole")]) == 0
+    assert "drawn" not in capsys.readouterr().err, "of a few there is no line each"
+
+
+def test_whether_the_lumen_was_segmented_beside_a_wire_is_said(finished: Path) -> None:
+    """Of a study with a reference it is not: the scan that it is segmented from has no wire."""
+    result = json.loads((finished / "cases" / "bifurcation" / "result.json").read_text(encoding="utf-8"))
+    assert not [text for text in result["assumptions"] if "segmented from frame 0" in text]
 
 
 def test_a_damaged_result_hides_no_other(
