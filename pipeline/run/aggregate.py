@@ -69,8 +69,8 @@ def aggregate(out: Path, run_info: dict[str, Any] | None = None, name: str = "ru
     tables.write(out / TIMINGS.file, TIMINGS, times)
     if run_info is not None:
         assumed = [*run_info.get("assumptions", ()), *shared_scans(found), *strangers(found)]
-        cases_of = {"assumptions": assumed, "cases": [result.case for result in found]}
-        cases_of["doubts"] = [*run_info.get("doubts", ()), *copies(validation(among))]
+        doubts = [*run_info.get("doubts", ()), *copies(validation(among))]
+        cases_of = {"assumptions": assumed, "doubts": doubts, "cases": [result.case for result in found]}
         write_json(out / name, run_info | cases_of | {"overall": whole})
     pooled = [] if mixed else frames_of(validation(cases))
     points = np.concatenate([np.zeros(0), *(frame.error_mm for frame in pooled)])

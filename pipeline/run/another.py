@@ -63,9 +63,8 @@ def copies(found: Sequence[Found]) -> list[str]:
         sigma = float(np.median([frame.row.get("trace_sigma_mm") or math.nan for frame in rows] or [math.nan]))
         for other in sorted({name for frame in rows for name in frame.guesses}):
             squares, count = np.sum([frame.guesses[other] for frame in rows if other in frame.guesses], axis=0)
-            pairs.setdefault(tuple(sorted((case.insertion, other))), []).append(
-                (float(np.sqrt(squares / count)), sigma)
-            )
+            both = tuple(sorted((case.insertion, other)))
+            pairs.setdefault(both, []).append((float(np.sqrt(squares / count)), sigma))
     farthest = {both: max(ways) for both, ways in pairs.items()}
     return [
         f"insertions {one!r} and {other!r} are traced to within {apart:.2g} mm of each other, where traces are known "

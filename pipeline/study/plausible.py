@@ -196,12 +196,16 @@ def other_voxels(header: Header | None) -> list[str]:
     return [f"spacing_mm: {note}; is that meant?" for note in notes if "where the file has" in note]
 
 
+def in_case(case: Case, scan: Header | None) -> list[str]:
+    """What is doubtful in a case beside its wire and its truth. scan : header of a scan of the case."""
+    return [*other_voxels(scan), *leads_out(case, scan), *odd_depths(case, scan), *wrapped_rolls(case)]
+
+
 def doubts(cases: Sequence[Case], config: Config) -> Iterator[str]:
     """All that is doubtful in a study, by its manifest and the headers of its scans, a sentence each."""
     yield from implausible(cases)
     for case in cases:
-        scan = first_of(case, config)
-        said = [*other_voxels(scan), *leads_out(case, scan), *odd_depths(case, scan), *wrapped_rolls(case)]
+        said = in_case(case, first_of(case, config))
         said += odd_truth(case, read_truth(case.truth, None)) if case.truth else []
         yield from (f"case {case.id!r}: {text}" for text in said)
     yield from shared(cases)

@@ -8,7 +8,7 @@ import numpy as np
 from pipeline.arrays.polyline import at_arc
 from pipeline.compare.metrics import point_to_curve
 from pipeline.model import Array, Curve
-from pipeline.run.stages.depths import ALIKE
+from pipeline.run.stages.depths import in_common
 from pipeline.run.stages.known import Frame
 from pipeline.status import FrameStatus
 from pipeline.trace.config import TraceConfig
@@ -73,9 +73,9 @@ def _together(both: Sequence[_Off], voxel_mm: float) -> list[str]:
         return []
     shift, longer = np.median([one.shift for one in both], axis=0), np.array([one.longer for one in both])
     sigma, tip_sigma = np.nan_to_num(np.median([(one.sigma, one.tip_sigma) for one in both], axis=0))
-    usual, said = float(np.median(longer)), []
+    usual, said = in_common(longer, max(ALL_LONGER * voxel_mm, OFF_SIGMAS * tip_sigma)), []
     if np.linalg.norm(shift) > max(ALL_VOXELS * voxel_mm, OFF_SIGMAS * sigma):
         said.append(f"all shifted by about {shift.round(2).tolist()} mm (LPS)")
-    if abs(usual) > max(ALL_LONGER * voxel_mm, OFF_SIGMAS * tip_sigma) and np.mean(longer * usual > 0) >= ALIKE:
+    if usual:
         said.append(f"{abs(usual):.2f} mm {'longer' if usual > 0 else 'shorter'} in the median")
     return [", ".join(said)] * bool(said)

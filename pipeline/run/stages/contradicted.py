@@ -37,11 +37,8 @@ def from_traces(known: Known, wires: Wires, config: CompareConfig) -> list[Squar
 def contradicted(run: Context, known: Known, ways: Sequence[Way], otherwise: Sequence[Sequence[Squares]]) -> list[str]:
     """A warning where one of ``ways`` lies far nearer than the wire as stated, in the case or in a frame of it.
 
-    Of several ways, the nearest. otherwise : of each of ``ways``, its wires ``from_traces``. Own simulators' wires say
-    nothing about what this one is told.
+    Of several ways, the nearest. otherwise : of each of ``ways``, its wires ``from_traces``.
     """
-    if run.case.simulated is not None:
-        return []
     frames = simulated_frames(known)
     elsewhere = _leave_elsewhere(known)
     if elsewhere:

@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from pipeline.arrays.grids import spread
+from pipeline.model import Array
 from pipeline.run.stages.known import Frame
 from pipeline.status import FrameStatus
 
@@ -48,6 +49,12 @@ def in_step(frames: Sequence[Frame], voxel_mm: float) -> list[Frame]:
     return out
 
 
+def in_common(apart: Array, least: float) -> float:
+    """The median (n,) of what frames are off by, where it is more than ``least`` and most are to one side; else 0."""
+    usual = float(np.median(apart))
+    return usual if abs(usual) > least and np.mean(apart * usual > 0) >= ALIKE else 0.0
+
+
 def stated_elsewhere(frames: Sequence[Frame], tolerance_mm: float) -> list[str]:
     """A warning where all traces are about as much shorter, or longer, than insertion_mm states.
 
@@ -55,10 +62,8 @@ def stated_elsewhere(frames: Sequence[Frame], tolerance_mm: float) -> list[str]:
     """
     apart = [c.length_mm - f.expected_mm for f in frames if (c := f.trusted_curve) is not None]
     known = np.array([mm for mm in apart if np.isfinite(mm)])
-    if len(known) < FEWEST or not abs(np.median(known)) > 0.5 * tolerance_mm:
-        return []
-    usual = float(np.median(known))
-    if np.mean(known * usual > 0) < ALIKE:
+    usual = in_common(known, 0.5 * tolerance_mm) if len(known) >= FEWEST else 0.0
+    if not usual:
         return []
     return [
         f"the traced wires are {abs(usual):.1f} mm {'longer' if usual > 0 else 'shorter'} than insertion_mm states "

@@ -10,15 +10,7 @@ from pipeline.load.geometry import LoadError
 from pipeline.load.views import read_views
 from pipeline.run.stages.known import Context, Frame, Known
 from pipeline.study.manifest import Case, not_one_per_frame
-from pipeline.study.plausible import (
-    implausible,
-    leads_out,
-    measured_otherwise,
-    odd_depths,
-    odd_truth,
-    other_voxels,
-    wrapped_rolls,
-)
+from pipeline.study.plausible import implausible, in_case, measured_otherwise, odd_truth
 
 
 def open_case(run: Context, known: Known) -> Known:
@@ -33,8 +25,7 @@ def open_case(run: Context, known: Known) -> Known:
         raise LoadError(f"case {case.id!r}: {wrong[0]}")
     run.log.assumptions += [case.calibrated] * bool(case.calibrated)
     run.log.warnings += [case.own_parameters] * bool(case.own_parameters)
-    run.log.warnings += [*implausible([case]), *leads_out(case, scans.first), *odd_depths(case, scans.first)]
-    run.log.warnings += [*other_voxels(scans.first), *wrapped_rolls(case), *_too_thin(case, scans)]
+    run.log.warnings += [*implausible([case]), *in_case(case, scans.first), *_too_thin(case, scans)]
     offset, rolls = run.config.simulate.roll_offset_deg, case.stated_roll_deg
     frames = [Frame(i, roll_deg=roll + offset) for i, roll in enumerate(each_frame(rolls, count))]
     if case.catheter:

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.arrays.cores import on_cores
-from pipeline.arrays.grids import corners_mm
+from pipeline.arrays.grids import corners_mm, indices_of
 from pipeline.load import Crop
 from pipeline.load.lumens import read_lumen
 from pipeline.model import Array, Lumen
@@ -67,7 +67,7 @@ def _require_entry(run: Context, lumen: Lumen) -> None:
 
 def _box_of(lumen: Lumen) -> tuple[Array, Array]:
     """The corners (3,) of the box, along the axes of LPS, of the voxels inside."""
-    inside = lumen.distance.to_mm(np.argwhere(lumen.distance.values < 0))
+    inside = lumen.distance.to_mm(indices_of(lumen.distance.values < 0))
     return inside.min(axis=0), inside.max(axis=0)
 
 
