@@ -11,10 +11,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from skimage.graph import MCP_Geometric
 from skimage.measure import label
 
-from pipeline.arrays.grids import indices_of
+from pipeline.compare.ways import cheapest_ways
 from pipeline.model import Array
 from solver import Grid
 
@@ -48,11 +47,11 @@ class Branches:
 def branches_of(distance: Grid, entry_mm: Array) -> Branches:
     """The branches of a lumen seen from an entry; ``distance`` in mm to its wall, negative inside."""
     lumen = distance.values < 0
-    inside = indices_of(lumen)
+    ways = cheapest_ways(np.where(lumen, 1.0, np.inf), distance.spacing_mm, distance.to_index(entry_mm))
+    assert ways is not None  # a lumen has voxels
+    inside, way = ways.voxels, ways.total
     at, thick = tuple(inside.T), SLICE_VOXELS * float(distance.spacing_mm.mean())
-    first = inside[np.argmin(np.sum((inside - distance.to_index(entry_mm)) ** 2, axis=1))]
-    ways, _ = MCP_Geometric(np.where(lumen, 1.0, np.inf), sampling=tuple(distance.spacing_mm)).find_costs([first])
-    way, bands = ways[at], np.zeros(lumen.shape, np.int32)
+    bands = np.zeros(lumen.shape, np.int32)
     reached = np.isfinite(way)
     bands[at] = np.where(reached, np.floor(np.where(reached, way, 0.0) / thick) + 1, 0)
     slices = np.asarray(label(bands, connectivity=3), dtype=np.int32)

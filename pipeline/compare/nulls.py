@@ -10,15 +10,14 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from skimage.graph import MCP_Geometric
 
-from pipeline.arrays.grids import indices_of
 from pipeline.arrays.polyline import at_arc, samples, smooth, to_length
 from pipeline.compare.branches import branches_of
 from pipeline.compare.config import CompareConfig
 from pipeline.compare.metrics import Way, point_to_curve, rms, scored
 from pipeline.compare.pinned import pinned
 from pipeline.compare.taut import pulled_tight
+from pipeline.compare.ways import cheapest_ways, nearest
 from pipeline.model import Array, Clamp, Lumen
 from reports.schema import ERRORS, predictor
 from solver import Grid, GuideWire, Status, VesselWall, relax
@@ -206,14 +205,6 @@ def score(clues: Clues, depth_mm: float, seen: Seen, curve_mm: Array, config: Co
 
 def voxel_path(clearance: Grid, cost: Array, entry_mm: Array, target_mm: Array) -> Array | None:
     """Cheapest path (n, 3) LPS mm through voxels of finite cost, or None where the two ends are not joined."""
-    walkable = indices_of(cost < np.inf)
-    if len(walkable) == 0:
-        return None
-    wanted = [clearance.to_index(p) for p in (entry_mm, target_mm)]
-    ends = [tuple(walkable[np.argmin(np.sum((walkable - index) ** 2, axis=1))]) for index in wanted]
-    search = MCP_Geometric(cost, sampling=tuple(clearance.spacing_mm))
-    total, _ = search.find_costs([ends[0]], [ends[1]])
-    if not np.isfinite(total[ends[1]]):
-        return None
-    inner = clearance.to_mm(np.array(search.traceback(ends[1])))
-    return np.vstack([entry_mm, inner[1:]])
+    ways = cheapest_ways(cost, clearance.spacing_mm, clearance.to_index(entry_mm))
+    way = None if ways is None else ways.to(nearest(ways.voxels, clearance.to_index(target_mm)))
+    return None if way is None else np.vstack([entry_mm, clearance.to_mm(way.astype(float))[1:]])
