@@ -32,11 +32,14 @@ BEYOND_GAP = "beyond_gap_mm"
 """Level of a curve with a gap in it: how much of it lies beyond."""
 GAP = "gap_mm"
 """Level of such a curve: how long the gap is."""
-GAP_SHARE, SIDE_MM = 0.6, 1.5
-"""Share of the line's grey on either side below which it has a gap, and how much line each side has at the least: blur
-leaves 0.3 to 0.5 in a gap of 1.5 mm (voxels of 0.5 mm)."""
-MOST_BEYOND_MM = 15.0
-"""Length beyond a gap up to which a line is one wire without more: coils and marked tips are no longer."""
+GAP_SHARE, SIDE_MM, MARK_MM = 0.6, 1.5, 0.75
+"""Share of the line's grey on either side below which it has a gap, and how much line there is before it and beyond it
+at the least: blur leaves 0.3 to 0.5 in a gap of 1.5 mm (voxels of 0.5 mm), and beyond it a marker of 1 mm may lie."""
+BRIGHTER = 0.75
+"""Which of the line's greys beyond a gap is held against it, by its rank."""
+LEAST_BEYOND_MM, MOST_BEYOND_MM = 2.0, 15.0
+"""Lengths beyond a gap between which a line is one wire without more: coils and marked tips are no longer, and what is
+no longer than a marker band may be that of a catheter (a band of 1 mm is 1.5 mm of line)."""
 
 
 def _marks_beyond(image: Subtraction, tube: Tube, line: Array) -> float:
@@ -114,20 +117,21 @@ def first_gap_mm(grey: Array, arc: Array, noise: float) -> tuple[float, float]:
     """Where a line's first gap begins and ends, mm; infinite where it has none.
 
     grey, arc : (n,) along the line.  noise : standard deviation of the grey.  A gap is darker than most of the line
-    before it and most of the line beyond it.
+    before it and the brighter part of the line beyond it: half of a blurred marker is its two flanks.
     """
     dark = grey + 2.0 * noise < GAP_SHARE * grey.max()  # no median is above that: a quarter of tracing was medians
-    for n in np.flatnonzero(dark & (arc > SIDE_MM) & (arc < arc[-1] - SIDE_MM)):
-        least = GAP_SHARE * min(np.median(grey[:n]), np.median(grey[n:]))
+    for n in np.flatnonzero(dark & (arc > SIDE_MM) & (arc < arc[-1] - MARK_MM)):
+        least = GAP_SHARE * min(np.median(grey[:n]), np.quantile(grey[n:], BRIGHTER))
         if grey[n] + 2.0 * noise < least:
             return float(arc[n]), float(arc[n + int(np.argmax(grey[n:] > least))])
     return np.inf, np.inf
 
 
 def of_one_line(image: Subtraction, tube: Tube, curve: Curve) -> Curve:
-    """The curve with how much of it lies beyond a gap, ambiguous where that is more than a wire's tip is long.
+    """The curve with how much of it lies beyond a gap, ambiguous where that is longer than a wire's tip, or a mark.
 
-    A second device that faces the wire's tip looks like the wire beyond a gap. Frames at other depths tell: a gap of
+    A second device that faces the wire's tip looks like the wire beyond a gap, and so does the marker at the end of a
+    catheter that reaches beyond the wire. Frames at other depths tell: a gap of
     the wire's own goes with the tip, one that a streak makes stays where it is.
     """
     line = dense(tube, 0.5 * image.voxel)
@@ -137,11 +141,12 @@ def of_one_line(image: Subtraction, tube: Tube, curve: Curve) -> Curve:
     if np.isinf(ends_mm) or curve.status is not FrameStatus.OK:
         return curve
     curve = replace(curve, levels={**curve.levels, BEYOND_GAP: beyond_mm, GAP: ends_mm - begins_mm})
-    if beyond_mm < MOST_BEYOND_MM or image.modelled:  # in a modelled background a stenosis looks like a gap
+    # in a modelled background a stenosis looks like a gap; so near to the tip there is hardly one
+    if LEAST_BEYOND_MM <= beyond_mm and (beyond_mm < MOST_BEYOND_MM or image.modelled):
         return curve
     got = f"a line with {beyond_mm:.1f} mm of it beyond a gap"
-    allowed = f"{MOST_BEYOND_MM:g} mm at most, or frames at other depths that show the same gap"
-    do = "look whether a second device faces the wire's tip there; state insertion_mm"
+    allowed = f"{LEAST_BEYOND_MM:g} to {MOST_BEYOND_MM:g} mm, or frames at other depths that show the same gap"
+    do = "look whether a second device faces the wire's tip there, or a marker is a catheter's; state insertion_mm"
     return replace(curve, status=FrameStatus.TRACE_AMBIGUOUS, note=note_of(got, allowed, do))
 
 
