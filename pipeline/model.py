@@ -209,6 +209,7 @@ class Curve:
     flagged : (n,) bool, points not to be trusted at that sigma (gap bridged, streak, strands in contact).
     in_plane : (n,) bool, points where the wire runs nearly in the plane of the scanner's rotation.
     elsewhere_mm : (m, 3) points of bright lines off the curve.
+    marks_mm : (k, 3) points as bright as the wire in the lumen beyond the curve's end.
     """
 
     points_mm: Array
@@ -221,12 +222,12 @@ class Curve:
     in_plane: NDArray[np.bool_] | None = None
     levels: Levels = field(default_factory=dict)
     elsewhere_mm: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    marks_mm: Array = field(default_factory=lambda: np.zeros((0, 3)))
 
     def __post_init__(self) -> None:
         """Freeze the arrays."""
-        object.__setattr__(self, "points_mm", read_only(self.points_mm, np.float64))
-        object.__setattr__(self, "elsewhere_mm", read_only(self.elsewhere_mm, np.float64))
-        object.__setattr__(self, "sigma_mm", read_only(self.sigma_mm, np.float64))
+        for name in ("points_mm", "sigma_mm", "elsewhere_mm", "marks_mm"):
+            object.__setattr__(self, name, read_only(getattr(self, name), np.float64))
         for name in ("flagged", "in_plane"):
             marks = getattr(self, name)
             marks = np.zeros(len(self.points_mm), bool) if marks is None else marks

@@ -15,7 +15,7 @@ from pipeline.trace.subtraction import CREST_VOXELS, Subtraction
 from pipeline.trace.tube import Tube
 from pipeline.trace.verdict import LEAST_SEEN, note_of
 from pipeline.trace.ways import goes_on_unseen
-from pipeline.trace.whose_end import nothing_beyond, of_one_device, of_one_line
+from pipeline.trace.whose_end import nothing_beyond, of_one_device, of_one_line, with_marks
 
 OWN_NOISE = 0.25
 """Share of what counts as noise that changes from voxel to voxel, below which the rest is no noise: white noise has 1,
@@ -91,7 +91,10 @@ def ends_in_nothing(image: Subtraction, tube: Tube, curve: Curve) -> Curve:
 def doubted(image: Subtraction, attempt: Attempt, curve: Curve) -> Curve:
     """The curve of an attempt with the first of all doubts, if there is any, as its status."""
     curve = ends_in_nothing(image, attempt.tube, faint_for_its_noise(curve))
-    if curve.status is not FrameStatus.OK or attempt.confirmed:  # a stated depth says where the wire ends
+    if curve.status is not FrameStatus.OK:
         return curve
-    curve = of_one_device(image, attempt.tube, nothing_beyond(image, attempt.tube, curve))
+    curve = with_marks(image, attempt.tube, curve)
+    if attempt.confirmed:  # a stated depth says where the wire ends
+        return curve
+    curve = of_one_device(image, attempt.tube, nothing_beyond(curve))
     return of_one_line(image, attempt.tube, curve)

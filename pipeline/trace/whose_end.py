@@ -20,10 +20,11 @@ from pipeline.trace.verdict import note_of
 
 MARK_BLUR = 1.0
 """Voxels by which grey is blurred where a mark is looked for: half as wide as a band of 1 mm is long."""
-MARK_SHARE, MARK_SIGMAS = 0.35, 8.0
-"""Share of the wire's own height, and standard deviations of noise, from which something is a mark."""
-MARK_VOXELS, MARK_OFF = 4, 4.0
-"""Fewest voxels of a mark, and its least distance from the tip in voxels: what is nearer belongs to the tip."""
+MARK_SHARE, MARK_SIGMAS = 0.35, 5.0
+"""Share of the wire's own height, and standard deviations of noise, from which something is a mark: a lumen has some
+thousand places that do not depend on each other, of which noise alone makes one in 3,000 a mark."""
+MARK_OFF = 4.0
+"""Least distance of a mark from the tip in voxels: what is nearer belongs to the tip."""
 BODY_MM = 3.0
 """Length from which a piece is the wire's body, and no marker band."""
 DIM_FROM_TIP = "dim_from_tip_mm"
@@ -42,8 +43,8 @@ LEAST_BEYOND_MM, MOST_BEYOND_MM = 2.0, 15.0
 no longer than a marker band may be that of a catheter (a band of 1 mm is 1.5 mm of line)."""
 
 
-def _marks_beyond(image: Subtraction, tube: Tube, line: Array) -> float:
-    """How far beyond the tip (mm) the lumen holds something as bright as the wire; 0 for nowhere.
+def _marks_beyond(image: Subtraction, tube: Tube, line: Array) -> Array:
+    """Places (n, 3) in the lumen beyond the tip that are as bright as the wire.
 
     A band of 1 mm that lies behind a stretch that nobody sees is too short to be found as a crest.
     """
@@ -58,19 +59,24 @@ def _marks_beyond(image: Subtraction, tube: Tube, line: Array) -> float:
     seen = smooth_voxels(image.grey, gaussian_taps(MARK_BLUR), flat)
     least *= tube.sigma**2 / (tube.sigma**2 + blur**2)
     found = voxels[seen > max(least, MARK_SIGMAS * image.noise_in(MARK_BLUR))] * image.spacing
-    if len(found) < MARK_VOXELS:
-        return 0.0
-    away, nearest = (np.asarray(part) for part in cKDTree(line).query(found))
-    beyond = away[(nearest == len(line) - 1) & (away > MARK_OFF * h)]
-    return float(beyond.min()) if len(beyond) >= MARK_VOXELS else 0.0
+    if not len(found):
+        return np.zeros((0, 3))
+    away, nearest = cKDTree(line).query(found)
+    return np.asarray(found[(nearest == len(line) - 1) & (away > MARK_OFF * h)])
 
 
-def nothing_beyond(image: Subtraction, tube: Tube, curve: Curve) -> Curve:
-    """The curve, or the same as ambiguous where something as bright as the wire lies in the lumen beyond its tip."""
+def with_marks(image: Subtraction, tube: Tube, curve: Curve) -> Curve:
+    """The curve with the places beyond its tip that are as bright as the wire."""
     with image.showing(tube.voxels, tube.rest):
-        away_mm = _marks_beyond(image, tube, dense(tube, 0.5 * image.voxel))
-    if not away_mm:
+        marks = _marks_beyond(image, tube, dense(tube, 0.5 * image.voxel))
+    return replace(curve, marks_mm=image.world(marks))
+
+
+def nothing_beyond(curve: Curve) -> Curve:
+    """The curve, or the same as ambiguous where it has marks beyond its tip."""
+    if not len(curve.marks_mm):
         return curve
+    away_mm = float(np.linalg.norm(curve.marks_mm - curve.points_mm[-1], axis=1).min())
     got = f"something as bright as the wire in the lumen {away_mm:.1f} mm beyond its tip"
     do = "look whether that is a marker at the wire's end, or another device; state insertion_mm"
     note = note_of(got, "a tip with nothing beyond it", do)
@@ -142,7 +148,7 @@ def of_one_line(image: Subtraction, tube: Tube, curve: Curve) -> Curve:
         return curve
     curve = replace(curve, levels={**curve.levels, BEYOND_GAP: beyond_mm, GAP: ends_mm - begins_mm})
     # in a modelled background a stenosis looks like a gap; so near to the tip there is hardly one
-    if LEAST_BEYOND_MM <= beyond_mm and (beyond_mm < MOST_BEYOND_MM or image.modelled):
+    if beyond_mm >= LEAST_BEYOND_MM and (beyond_mm < MOST_BEYOND_MM or image.modelled):
         return curve
     got = f"a line with {beyond_mm:.1f} mm of it beyond a gap"
     allowed = f"{LEAST_BEYOND_MM:g} to {MOST_BEYOND_MM:g} mm, or frames at other depths that show the same gap"

@@ -115,3 +115,22 @@ def test_a_gap_that_nothing_explains_is_a_warning_and_a_stated_depth_ends_all_do
     assert "state insertion_mm" in said[0]
     stated = [replace(f, expected_mm=40.0) for f in found]
     assert own_gaps(stated, 0.3) == (stated, [])
+
+
+def marked(lengths: list[float], expected: float = NAN) -> list[Frame]:
+    """Frames in which a marker stands 36 mm deep, seen where the wire ends well before it."""
+    at = np.array([[0.0, 0.3, 36.0]])
+    return [
+        replace(f, curve=replace(f.curve, marks_mm=at if f.curve.length_mm < 32.0 else at[:0]))
+        for f in frames(lengths, [expected] * len(lengths))
+        if f.curve is not None
+    ]
+
+
+@pytest.mark.parametrize("expected", [NAN, 35.0], ids=["no depth", "a depth"])
+def test_a_curve_does_not_end_at_a_marker_that_stood_there_before(expected: float):
+    """The marker of a catheter that stays where it is was 1.6 mm of wire, and ok, with a stated depth, too."""
+    found, _ = own_gaps(marked([20.0, 36.6, 40.0], expected), 0.4)
+    assert [f.status for f in found] == ["ok", "trace_ambiguous", "ok"], "the third goes past it"
+    assert "lay in frame 0, beyond 20.0 mm of wire" in found[1].message
+    assert all(f.ok for f in own_gaps(marked([33.0, 36.6], expected), 0.4)[0]), "seen by none"

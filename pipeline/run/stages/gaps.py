@@ -1,7 +1,7 @@
 """Gaps in traced wires: the wire's own, a streak's, or what lies between its tip and a second device that faces it.
 
 A wire's own gap goes with its tip, a streak makes one that stays where it is. What already lay ahead of the wire's tip
-in another frame, and stayed there while the wire came nearer, is no part of it.
+in another frame, and stayed there while the wire came nearer, is no part of it: a line, or the marker of a catheter.
 """
 
 from collections.abc import Sequence
@@ -24,6 +24,8 @@ CAME_NEARER_MM = 2.0
 """By how much the wire before the gap must have come nearer to a line that stayed where it was."""
 STAYED_VOXELS, STAYED_MM = 2.0, 2.5
 """How closely, and over what length, the line beyond a gap must lie where another frame has one off its wire."""
+END_MM = 2.0
+"""Length of a curve's end that may be a marker that lay there before, and what a marked tube shows around it."""
 
 
 def own_gaps(frames: Sequence[Frame], voxel_mm: float) -> tuple[list[Frame], list[str]]:
@@ -45,7 +47,7 @@ def own_gaps(frames: Sequence[Frame], voxel_mm: float) -> tuple[list[Frame], lis
         frame = out[with_gap[n]]
         if frame.stage == "trace" and frame.status == FrameStatus.TRACE_AMBIGUOUS.identifier:
             out[with_gap[n]] = frame.cleared(cleared(curves[n], BEYOND_GAP))
-    out = _faced(out, voxel_mm)
+    out = [_past_marks(frame, frames, voxel_mm) for frame in _faced(out, voxel_mm)]
     odd = [f"{out[with_gap[n]].index} ({beyond[n]:.1f} mm)" for n in np.flatnonzero(~agreed) if out[with_gap[n]].ok]
     if not odd:
         return out, []
@@ -82,3 +84,23 @@ def _lay_there(curve: Curve, other: Curve, voxel_mm: float) -> bool:
     arc = arc_length(curve.points_mm)
     off = cKDTree(other.elsewhere_mm).query(curve.points_mm[arc > ends_mm])[0]
     return bool(np.mean(off < STAYED_VOXELS * voxel_mm) * (arc[-1] - ends_mm) > STAYED_MM)
+
+
+def _past_marks(frame: Frame, frames: Sequence[Frame], voxel_mm: float) -> Frame:
+    """The frame; failed where its curve ends at a mark that stood there when the wire was farther back."""
+    curve = frame.trusted_curve
+    if curve is None:
+        return frame
+    arc = arc_length(curve.points_mm)
+    end = cKDTree(curve.points_mm[arc > arc[-1] - END_MM])
+    for other in frames:
+        if other.curve is None or other.curve.length_mm > curve.length_mm - CAME_NEARER_MM:
+            continue
+        if np.any(end.query(other.curve.marks_mm.reshape(-1, 3))[0] < STAYED_VOXELS * voxel_mm):
+            note = (
+                f"trace: wire: got an end where something as bright as the wire lay in frame {other.index}, beyond "
+                f"{other.curve.length_mm:.1f} mm of wire; expected an end with nothing there before; look for a "
+                "catheter's marker; state the catheter and its insertion_mm"
+            )
+            return frame.failed("trace", FrameStatus.TRACE_AMBIGUOUS, note)
+    return frame
