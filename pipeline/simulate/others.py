@@ -24,7 +24,13 @@ SAME = 0.15
 """How near log(depth / length) must be to the logarithm of a unit's factor for that unit to be suggested."""
 SHORTER = 0.5
 """How much shorter the wire of the next deeper frame must be, over the difference of depths, to be in a wrong place."""
+LAGS = (1, -1, 2, -2)
+"""By how many frames a numbering of wires is tried that is off."""
+LAG_FITS, LAG_FEWEST = 0.25, 3
+"""How much better depths must fit then, over how badly they fit as they are, and in how many frames at the least."""
 MIRROR = np.array([-1.0, -1.0, 1.0])
+AXES = {"y, x, z": (1, 0, 2), "z, y, x": (2, 1, 0)}
+"""Other orders of coordinates: that of a picture's rows and columns, and that of an array whose last axis is x."""
 
 
 def begun(points_mm: Array, entry_mm: Array, direction: Array) -> Array:
@@ -85,15 +91,16 @@ def _misplaced(points_mm: Array, entry_mm: Array, direction: Array, near_mm: flo
 
 
 def _readings(points_mm: Array, unit: str) -> Iterator[tuple[str, Array]]:
-    """Other readings of the numbers (point order, RAS, units), each with the resulting points; fewest changes first."""
+    """Other readings of the numbers (point order, axes, units), each with its points; fewest changes first."""
     orders = {"": points_mm, "read from its other end (tip first)": points_mm[::-1]}
-    spaces = {"": np.ones(3), "RAS": MIRROR}
+    spaces = {"": np.eye(3), "RAS": np.diag(MIRROR)}
+    spaces |= {f"written as {name}": np.eye(3)[list(axes)] for name, axes in AXES.items()}
     stated = f", not in {unit}" * (unit != "mm")
     units = {"": 1.0} | {f"in {name}{stated}": factor for name, factor in other_units(unit).items()}
     all_of_them = [tuple(zip(*named, strict=True)) for named in product(orders.items(), spaces.items(), units.items())]
-    for names, (points, signs, factor) in sorted(all_of_them, key=lambda one: sum(map(bool, one[0]))):
+    for names, (points, axes, factor) in sorted(all_of_them, key=lambda one: sum(map(bool, one[0]))):
         if any(names):
-            yield " and ".join(filter(None, names)), points * signs * factor
+            yield " and ".join(filter(None, names)), points @ axes * factor
 
 
 def not_to_depth(length_mm: float, depth_mm: float, tolerance_mm: float, stated: str = "mm") -> str:
@@ -116,3 +123,23 @@ def out_of_order(lengths_mm: Array, depths_mm: Array) -> list[tuple[int, int]]:
         for a, b in pairwise(order)
         if lengths_mm[a] - lengths_mm[b] > SHORTER * (depths_mm[b] - depths_mm[a]) > 0.0
     ]
+
+
+def numbered_otherwise(lengths_mm: Array, depths_mm: Array) -> int:
+    """By how many frames wires lie ahead of those whose depth they have; 0 where they have their own, or no other's.
+
+    lengths_mm, depths_mm : (n,) in the order of the frames, NaN where one has none.
+    """
+
+    def off(lag: int) -> float:
+        last = len(depths_mm) - max(0, lag)
+        own = np.abs(lengths_mm[max(0, -lag) : last] - depths_mm[max(0, lag) : len(depths_mm) + min(0, lag)])
+        own = own[np.isfinite(own)]
+        return float(np.median(own)) if len(own) >= LAG_FEWEST else np.inf
+
+    step = np.abs(np.diff(depths_mm))
+    as_it_is = off(0)
+    if not np.isfinite(step).any() or not np.isfinite(as_it_is) or as_it_is < SHORTER * float(np.nanmedian(step)):
+        return 0
+    best = min(LAGS, key=off)
+    return best if off(best) < LAG_FITS * as_it_is else 0

@@ -22,7 +22,7 @@ from pipeline.load.geometry import LoadError, Source
 from pipeline.load.vtk import read_vtk_points
 from pipeline.load.wires import numbered_frames, read_wires
 from pipeline.model import arc_length
-from pipeline.simulate.others import begun, not_to_depth, oddity, out_of_order
+from pipeline.simulate.others import begun, not_to_depth, numbered_otherwise, oddity, out_of_order
 from pipeline.status import InputError
 from pipeline.study.others import named
 from reports.export import write_markups_curve, write_polyline_vtp
@@ -183,6 +183,8 @@ def nan(wire: Array) -> Array:
         (lambda wire: wire / 1000.0, "if it were in m"),
         (lambda wire: wire / 25.4, "if it were in inch"),
         (lambda wire: wire * [-1.0, -1.0, 1.0], "if it were RAS"),
+        (lambda wire: wire[:, ::-1], "if it were written as z, y, x"),
+        (lambda wire: wire[::-1, ::-1], "tip first) and written as z, y, x"),
         (lambda wire: wire[::-1] * [-0.1, -0.1, 0.1], "tip first) and RAS and in cm"),
         (lambda wire: wire + 30.0 * np.eye(3)[2], "mm from entry_mm"),
         (lambda wire: wire @ np.diag([1.0, 1.0, -1.0]) + [0.0, 0.0, 14.0], "degrees away"),
@@ -221,6 +223,18 @@ def test_wires_in_another_order_are_told() -> None:
     assert out_of_order(depths[::-1], depths) == [(0, 1), (1, 2), (2, 3)]
     # frames may come in any order, and some have no wire
     assert out_of_order(np.array([13.0, np.nan, 10.0]), np.array([13.0, 11.5, 10.0])) == []
+
+
+def test_wires_with_the_depths_of_other_frames_are_told() -> None:
+    """Numbers off by one passed where frames lie nearer together than the tolerance of depths."""
+    depths = np.array([10.0, 11.3, 12.5, 14.0, 15.1])
+    assert numbered_otherwise(depths + [0.1, -0.2, 0.1, 0.0, -0.1], depths) == 0
+    assert numbered_otherwise(np.append(depths[1:], 16.4), depths) == 1
+    assert numbered_otherwise(np.append(8.8, depths[:-1]), depths) == -1
+    assert numbered_otherwise(np.append([7.2, 8.8], depths[:-2]), depths) == -2
+    assert numbered_otherwise(depths - 0.7, depths) == 0, "too short, and no other frame's"
+    assert numbered_otherwise(np.array([np.nan, 12.5, 14.0, np.nan, 16.4]), depths) == 0, "in two frames alone"
+    assert numbered_otherwise(np.array([11.3, np.nan, 14.0, 15.1, 16.4]), depths) == 1
 
 
 def test_a_score_of_swapped_wires_says_so(known: Known, tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ from pipeline.model import Array, OtherWire, arc_length
 from pipeline.run.stages.known import Context, Frame, Known
 from pipeline.run.stages.own_curves import rough
 from pipeline.simulate import wall_of
-from pipeline.simulate.others import MIRROR, begun, not_to_depth, oddity, out_of_order
+from pipeline.simulate.others import MIRROR, begun, not_to_depth, numbered_otherwise, oddity, out_of_order
 from pipeline.status import FrameStatus
 from reports.case_files import counted
 
@@ -46,11 +46,16 @@ def _listed(files: Sequence[OtherFile]) -> str:
 
 
 def _in_another_order(frames: Sequence[Frame]) -> list[str]:
-    """A warning where wires get shorter from a frame to the next deeper one: files may be those of other frames."""
+    """A warning where wires get shorter from a frame to the next deeper one, or have the depths of other frames."""
     lengths = [np.nan if f.simulated is None else float(arc_length(f.simulated.joints_mm)[-1]) for f in frames]
-    found = out_of_order(np.array(lengths), np.array([f.depth_mm for f in frames]))
+    depths = np.array([f.depth_mm for f in frames])
+    found = out_of_order(np.array(lengths), depths)
     if not found:
-        return []
+        lag = numbered_otherwise(np.array(lengths), depths)
+        return [
+            f"wires have the depths of other frames, that of frame n the depth of frame n {'+' if lag > 0 else '-'} "
+            f"{abs(lag)}: are the files numbered as the frames are?"
+        ] * bool(lag)
     here, deeper = (f"{lengths[n]:.2f} mm long in frame {n}, {frames[n].depth_mm:.2f} mm deep" for n in found[0])
     return [
         f"the wires are not in the order of the frames: {here}, and {deeper} ({len(found)} of {len(frames) - 1} steps "
