@@ -98,6 +98,12 @@ def warnings_of(folder: Path) -> list[str]:
         return []
 
 
+def copied_from_traces(out_dir: Path) -> str:
+    """The warning that a run's simulated wires were made from the traces; empty where no case has it."""
+    said = (f"{case.name}: {text}" for case in find_cases(out_dir) for text in warnings_of(case))
+    return next((text for text in said if MADE_FROM_TRACES in text), "")
+
+
 def results_in(out_dir: Path) -> dict[str, dict[str, Any]]:
     """result.json of every case, empty where there is none, or one that cannot be read, which is said elsewhere."""
     found: dict[str, dict[str, Any]] = {}

@@ -1,6 +1,6 @@
 """The page of several simulators side by side, from simulators.csv and where.csv."""
 
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -8,13 +8,21 @@ from urllib.parse import quote
 import pandas as pd
 
 from reports import _content
-from reports.case_files import MADE_FROM_TRACES, counted, find_cases, listed, not_reached, not_run_sentence, warnings_of
+from reports.case_files import (
+    copied_from_traces,
+    counted,
+    find_cases,
+    listed,
+    not_reached,
+    not_run_sentence,
+    warnings_of,
+)
 from reports.figures.simulators import SimulatorFiles, leads
 from reports.origin import mixed_settings
 from reports.page import draw_sections, write_page
 from reports.schema import OVERALL_FILE, SIMULATORS, SUMMARY, WHERE, Column
 from reports.tables import read_if_there
-from reports.verdict import OURS, TIPS_OFF, badge, tips_off, verdict
+from reports.verdict import COPIED, OURS, TIPS_OFF, badge, tips_off, verdict
 
 PAGE = "simulators.html"
 _MOST_WARNINGS = 5
@@ -25,8 +33,9 @@ _MOST_SHARED = 0.75
 def render_simulators(out_dir: Path, embed: bool = False) -> Path:
     """Draw the figure and write simulators.html; returns its path. embed : pictures and numbers into the page."""
     files = SimulatorFiles(*(read_if_there(out_dir / table.file, table) for table in (SIMULATORS, WHERE)))
-    table, columns = _one_table(files.simulators)
-    grid = _content.grid(table, columns, bad=_doubtful(table), nothing=_content.NOTHING)
+    copied = {name: said for name, folder in folders_in(out_dir).items() if (said := copied_from_traces(folder))}
+    table, columns = _one_table(files.simulators, copied)
+    grid = _content.grid(table, columns, bad=_doubtful(table, copied), nothing=_content.NOTHING)
     folders = {name: folders_in(out_dir)[name] for name in table["simulator"]}
     links = {name: quote((folder / "index.html").relative_to(out_dir).as_posix()) for name, folder in folders.items()}
     for row, name in zip(grid["rows"], table["simulator"], strict=True):
@@ -36,14 +45,17 @@ def render_simulators(out_dir: Path, embed: bool = False) -> Path:
     page = {
         "title": "Simulators side by side - wireval",
         "names": list(folders),
-        "said": [{"name": name, "link": links[name]} | _said(alone[name], folders[name], ours) for name in folders],
+        "said": [
+            {"name": name, "link": links[name]} | _said(alone[name], folders[name], ours, copied.get(name, ""))
+            for name in folders
+        ],
         "ours": OURS,
         "interval": next(iter(table["interval"].dropna()), ""),
         "simulators": grid,
         "few": in_common(files.simulators),
         "sections": draw_sections("simulators", files, out_dir, embed),
         "where": _where(files.where),
-        "off": sorted(files.where["simulator"][files.where["lead"] == TIPS_OFF].unique()),
+        "off": _never_nearest(files.where),
     }
     return write_page("simulators.html.j2", page, out_dir / PAGE)
 
@@ -54,23 +66,28 @@ def folders_in(out_dir: Path) -> dict[str, Path]:
     return {name: out_dir / "simulators" / name if number else out_dir for number, name in enumerate(names)}
 
 
-def _said(alone: Mapping[Any, Any], folder: Path, ours: Mapping[str, list[str]]) -> dict[str, Any]:
+def _said(alone: Mapping[Any, Any], folder: Path, ours: Mapping[str, list[str]], copied: str = "") -> dict[str, Any]:
     """Badge and verdict of a simulator, and warnings of its cases that the same scans do not give with our wires.
 
-    alone : its row of simulators.csv, which counts its frames also where nothing is pooled over them.
+    alone : its row of simulators.csv, which counts its frames also where nothing is pooled over them, and whose skill
+    is over frames that count for all.     copied : that its wires were made from the traces.
     """
     whole = read_if_there(folder / OVERALL_FILE, SUMMARY)
     row = {str(name): value for name, value in whole.iloc[0].items()} if len(whole) else {}
+    row |= {name: value for name, value in alone.items() if "strongest" in name}
+    if pd.isna(alone["skill_strongest"]):  # its few frames are not those of the others
+        row.pop("skill", None)
     lines = [f"{case}: {t}" for case, said in _warnings(folder).items() for t in said if t not in ours.get(case, ())]
-    more = counted(rest := len(lines) - _MOST_WARNINGS, "more warning")
     missing, mixed, good = not_run_sentence(folder), mixed_settings(folder), alone["frames_ok"]
     failed = f"On {good} of {alone['frames']} frames: " if good < alone["frames"] else ""
     status = "cases missing" if missing else "frames failed" if failed else "settings differ" if mixed else "ok"
-    said, theirs = verdict(row, alone["simulator"]), next((line for line in lines if MADE_FROM_TRACES in line), "")
-    if theirs and status == "ok":
-        status, said = "made from the traces", f"{theirs}."
+    said = verdict(row, alone["simulator"])
+    if copied and status == "ok":
+        status, said = COPIED, f"{copied}."
+        lines = [line for line in lines if line != copied]
     said = failed + said if said else mixed or not_reached(folder) or "No frame of it has a result." * (not good)
     aside = f" Of the study {missing}." if missing else ""
+    more = counted(rest := len(lines) - _MOST_WARNINGS, "more warning")
     return {
         "badge": badge(status, status == "ok", row),
         "verdict": said + aside,
@@ -83,13 +100,14 @@ def _warnings(folder: Path) -> dict[str, list[str]]:
     return {case.name: warnings_of(case) for case in find_cases(folder)}
 
 
-def _one_table(rows: pd.DataFrame) -> tuple[pd.DataFrame, list[Column]]:
+def _one_table(rows: pd.DataFrame, copied: Container[str]) -> tuple[pd.DataFrame, list[Column]]:
     """A row for each simulator: its own numbers, then the ratio of its error to that of every other one.
 
-    In order of rms_mm; below those, who has failed frames, which rms_mm leaves out, or tips that it does not see.
+    In order of rms_mm; below those, who has failed frames, which rms_mm leaves out, tips that it does not see,
+    or wires made from the traces. copied : these.
     """
     table = rows[rows["against"].isna()]
-    table = table.assign(doubtful=_doubtful(table)).sort_values(["doubtful", "rms_mm"], kind="stable")
+    table = table.assign(doubtful=_doubtful(table, copied)).sort_values(["doubtful", "rms_mm"], kind="stable")
     table = table.drop(columns="doubtful").reset_index(drop=True)
     columns = list(SIMULATORS.shown("cases"))
     pairs = rows[rows["against"].notna()]
@@ -103,9 +121,9 @@ def _one_table(rows: pd.DataFrame) -> tuple[pd.DataFrame, list[Column]]:
     return table, columns
 
 
-def _doubtful(table: pd.DataFrame) -> "pd.Series[bool]":
-    """Whether a simulator has failed frames, or tips that rms_mm does not see."""
-    off = [bool(tips_off(dict(row))) for _, row in table.iterrows()]
+def _doubtful(table: pd.DataFrame, copied: Container[str]) -> "pd.Series[bool]":
+    """Whether a simulator has failed frames, tips that rms_mm does not see, or wires made from the traces."""
+    off = [row["simulator"] in copied or bool(tips_off(dict(row))) for _, row in table.iterrows()]
     return table["frames_ok"].lt(table["frames"]) | pd.Series(off, table.index, dtype=bool)
 
 
@@ -116,14 +134,26 @@ def in_common(rows: pd.DataFrame) -> str:
     """
     table = rows[rows["against"].isna()]
     shared, most = table["common_frames"].min(), table["frames_ok"].max()
+    some = table[table["frames_ok"] > 0]
+    unjudged = some["skill_strongest"].isna()
+    few = some[unjudged & (not unjudged.all())]
+    named = listed([f"{row['simulator']} ({row['frames_ok']} of {most})" for row in few.to_dict("records")])
+    left_out = f"too few frames for a skill beside others: {named}" if named else ""
     if not shared <= _MOST_SHARED * most:
-        return ""
-    fewer = table[table["frames_ok"].between(1, most - 1)].to_dict("records")
+        return left_out
+    fewer = some[(some["frames_ok"] < most) & ~some.index.isin(few.index)].to_dict("records")
     names = listed([f"{row['simulator']} ({row['frames_ok']})" for row in fewer])
-    return (
+    told = (
         f"only {shared:.0f} of {most} frames count for all simulators, and skill_strongest beside others is over "
         f"these: fewer than {most} count for {names}; a score without them tells more"
     )
+    return "; ".join(filter(None, (told, left_out)))
+
+
+def _never_nearest(where: pd.DataFrame) -> list[str]:
+    """Who is never the nearest, each with the reason. where : of where.csv."""
+    told = where[where["lead"].isin([TIPS_OFF, COPIED])][["simulator", "lead"]].drop_duplicates()
+    return sorted(f"{row['simulator']} ({row['lead']})" for row in told.to_dict("records"))
 
 
 def _where(rows: pd.DataFrame) -> _content.Grid | None:

@@ -18,18 +18,22 @@ from pipeline.run.another import with_another
 from pipeline.run.overall import Found, found_cases, overall, ratio, validation
 from pipeline.run.results import found_results
 from reports import tables
-from reports.case_files import listed
+from reports.case_files import copied_from_traces, listed
 from reports.html import render_index
 from reports.origin import mixed_settings
 from reports.schema import FAILURES, POINTS, SIMULATORS, WHERE
 from reports.simulators import in_common, render_simulators
-from reports.verdict import OURS, TIPS_OFF, tips_off
+from reports.verdict import COPIED, OURS, TIPS_OFF, tips_off
 
 STEPS_MM = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
 MOST_BINS = 12
-OF_SKILL = ("skill_strongest", "strongest_null", "strongest_frames")
+OF_SKILL = ("skill_strongest", "skill_strongest_low", "skill_strongest_high", "strongest_null", "strongest_frames")
+FEW = 0.5
+"""Share of the frames of the simulator that has most below which one's few frames are not asked of all."""
 Studies = Mapping[str, Sequence[Found]]
 Frames = Set[tuple[str, int]]
+Off = Mapping[str, str]
+"""Why simulators are never the nearest."""
 
 
 class Piece(NamedTuple):
@@ -47,12 +51,13 @@ def write_comparison(out: Path, folders: Mapping[str, Path]) -> list[str]:
     pairs = [(one, other) for one in studies for other in studies if one != other and not mixed]
     common = _common(studies)
     rows = [_alone(name, found, common) for name, found in studies.items()]
-    off = {row["simulator"] for row in rows if tips_off(row)}
+    copied = {name for name, folder in folders.items() if copied_from_traces(folder)}
+    off = {row["simulator"]: TIPS_OFF for row in rows if tips_off(row)} | dict.fromkeys(copied, COPIED)
     sentences = [mixed] * bool(mixed)
     for one, other in pairs:
         both = ratio(studies[other], studies[one])
         if both is not None:
-            caveat = _caveat(off & {one, other})
+            caveat = _caveat({name for name in (one, other) if off.get(name) == TIPS_OFF})
             values = {"rms_ratio": both.value, "rms_ratio_low": both.low, "rms_ratio_high": both.high}
             row, told = intervals.fields(values, "; ".join([both.note, *caveat]))
             rows.append({"simulator": one, "against": other, "common_frames": both.frames, "interval": told, **row})
@@ -99,18 +104,22 @@ def side_by_side(out: Path, folders: Mapping[str, Path], embed: bool) -> list[st
 
 
 def _common(studies: Studies) -> Frames:
-    """The frames, by case and number, that count for every simulator of which any does."""
-    kept = [
-        {(case.result.case, number) for case in validation(found) for number in case.frames}
-        for found in studies.values()
-    ]
-    return set.intersection(*filter(None, kept)) if any(kept) else set()
+    """The frames, by case and number, that count for every simulator with at least FEW times the most frames."""
+    kept = [_numbers(found) for found in studies.values()]
+    most = max(map(len, kept), default=0)
+    return set.intersection(*(one for one in kept if len(one) >= FEW * most)) if most else set()
+
+
+def _numbers(found: Sequence[Found]) -> set[tuple[str, int]]:
+    """The frames that count, by case and number."""
+    return {(case.result.case, number) for case in validation(found) for number in case.frames}
 
 
 def _alone(name: str, found: Sequence[Found], common: Frames) -> dict[str, Any]:
     """A simulator's numbers as in its own overall.csv; where no frame counts, its planned frames with none ok.
 
-    Skill is over ``common`` frames: who lacks some would be held against another predictor, or on easier ones.
+    Skill is over ``common`` frames: who lacks some would be held against another predictor, or on easier ones; who
+    lacks most has none.
     """
     used = validation(found)
     planned = {"frames": sum(case.result.frame_count for case in used), "frames_ok": 0, "within_1mm": 0.0}
@@ -118,16 +127,24 @@ def _alone(name: str, found: Sequence[Found], common: Frames) -> dict[str, Any]:
         replace(c, frames={n: frame for n, frame in c.frames.items() if (c.result.case, n) in common}) for c in used
     ]
     own, skill = overall(found), overall(alike)
-    row = planned | own | {key: skill.get(key) for key in OF_SKILL if own} | {"common_frames": len(common)}
+    judged = own and common <= _numbers(found)
+    row = planned | own | {key: skill.get(key) if judged else None for key in OF_SKILL} | {"common_frames": len(common)}
     return {key: value for key, value in row.items() if key in SIMULATORS.names} | {"simulator": name}
 
 
-def _where(folders: Mapping[str, Path], studies: Studies, common: Frames, off: Set[str]) -> Iterator[dict[str, Any]]:
+def _where(
+    folders: Mapping[str, Path], studies: Studies, common: Frames, off: Mapping[str, str]
+) -> Iterator[dict[str, Any]]:
     """For each bin of the distance from the tip and of the depth, every simulator's error and who is nearest.
 
-    off : simulators whose tips lie off. Distances to the traced wire do not show that, so these are never the nearest.
+    off : simulators whose tips lie off, or that were made from the traces: distances to the traced wire do not show
+    that, so these are never the nearest. One that lacks most of the frames is left out.
     """
-    points = {name: list(_points(folders[name], found, common)) for name, found in studies.items()}
+    points = {
+        name: list(_points(folders[name], found, common))
+        for name, found in studies.items()
+        if common <= _numbers(found)
+    }
     for along, place in (("distance from the tip", 1), ("insertion depth", 2)):
         values = [np.max(part[place]) for parts in points.values() for part in parts]
         if not values:
@@ -167,14 +184,16 @@ def _pieces(parts: Sequence[Part], place: int, low: float, high: float) -> list[
     return pieces
 
 
-def _rows(head: dict[str, Any], found: Mapping[str, Sequence[Piece]], off: Set[str]) -> Iterator[dict[str, Any]]:
+def _rows(
+    head: dict[str, Any], found: Mapping[str, Sequence[Piece]], off: Mapping[str, str]
+) -> Iterator[dict[str, Any]]:
     """A row for each simulator in a bin; the nearest one that is not ``off`` also gets its lead and how sure it is."""
     mean = {name: sum(p.squares for p in pieces) / sum(p.points for p in pieces) for name, pieces in found.items()}
     # of those that are the same but for rounding the first that was given, run after run
     order = sorted((name for name in mean if name not in off), key=lambda name: float(f"{mean[name]:.6g}"))
     for name in found:
         row = head | {"simulator": name, "rms_mm": float(np.sqrt(mean[name])), "frames": len(found[name])}
-        row |= {"lead": TIPS_OFF} if name in off else {}
+        row |= {"lead": off[name]} if name in off else {}
         if len(order) > 1 and name == order[0]:
             row |= _lead(found[order[0]], found[order[1]])
         yield row

@@ -13,7 +13,7 @@ import pytest
 from numpy.typing import NDArray
 
 from pipeline.cli import main
-from pipeline.run.simulators import Piece, _rows, side_by_side, write_comparison
+from pipeline.run.simulators import OF_SKILL, Piece, _rows, side_by_side, write_comparison
 from reports import tables
 from reports.case_files import MADE_FROM_TRACES
 from reports.schema import ERRORS, POINTS, SIMULATORS, SUMMARY, WHERE
@@ -122,6 +122,23 @@ def test_who_takes_frames_from_all_is_named(tmp_path: Path) -> None:
     assert "fewer than 24 count for half (12); " in said
 
 
+def test_who_has_few_frames_takes_them_from_nobody(tmp_path: Path) -> None:
+    """One with 4 of 32 frames changed the skill of all others from 0.950 to 0.807, and its figure to a strip."""
+    lost = tuple((case, frame) for case in range(CASES) for frame in (1, 2, 3))
+    made = {"wireval": even(0.2), "other": even(0.3)}
+    folders = {name: write_tree(tmp_path / name, error) for name, error in made.items()}
+    folders["few"] = write_tree(tmp_path / "few", even(0.2), failed=lost)
+    write_comparison(tmp_path, folders)
+    table = tables.read(tmp_path / "simulators.csv", SIMULATORS)
+    alone = table[table["against"].isna()].set_index("simulator")
+    assert list(alone["common_frames"]) == [24, 24, 24]
+    assert list(alone["skill_strongest"].isna()) == [False, False, True]
+    assert in_common(table) == "too few frames for a skill beside others: few (6 of 24)"
+    assert set(pd.read_csv(tmp_path / "where.csv")["simulator"]) == {"wireval", "other"}
+    ratios = table[table["against"] == "few"].set_index("simulator")
+    assert list(ratios["common_frames"]) == [6, 6], "pairs are as they were"
+
+
 def test_nothing_is_said_where_most_frames_count_for_all(compared: Path) -> None:
     assert in_common(tables.read(compared / "simulators.csv", SIMULATORS)) == ""
 
@@ -171,7 +188,7 @@ def test_who_has_its_tips_off_is_nearest_nowhere(tmp_path: Path) -> None:
     assert set(where.query("simulator == 'short'")["lead"]) == {"the tips lie off"}
     assert set(where.query("lead == 'clear'")["simulator"]) == {"wireval"}
     page = (tmp_path / "simulators.html").read_text(encoding="utf-8")
-    assert "Never the nearest, since their tips lie off" in page
+    assert "does not see: short (the tips lie off)." in page
     assert said[-1] == f"score of short, fair, wireval.  side by side: {tmp_path / 'simulators.html'}"
 
 
@@ -228,7 +245,7 @@ def test_simulators_of_different_settings_are_not_compared(tmp_path: Path) -> No
 def test_of_a_tie_the_first_leads_run_after_run(first: float) -> None:
     """Wires that were computed and the same ones read again differ by rounding: where.csv differed after a resume."""
     found = {"own": [Piece("a", first, 4)], "wireval": [Piece("a", 1.0, 4)], "far": [Piece("a", 2.0, 4)]}
-    rows = list(_rows({}, found, set()))
+    rows = list(_rows({}, found, {}))
     assert [row["simulator"] for row in rows if "lead" in row] == ["own"]
 
 
@@ -248,12 +265,18 @@ def test_the_page(compared: Path) -> None:
 
 def test_the_page_says_how_good_each_is_and_what_was_warned_of(compared: Path) -> None:
     """`score` writes the first simulator beside the page; a warning that our wires get, too, is none of another's."""
-    for name, skill in (("tip", 0.5), ("worse", 0.4), ("wireval", -1.0)):
+    skills = {"tip": 0.5, "worse": 0.4, "wireval": -1.0}
+    rows = tables.read(compared / "simulators.csv", SIMULATORS)
+    of_skill = {name: np.nan for name in OF_SKILL if name.endswith(("_low", "_high"))}
+    rows = rows.assign(skill_strongest=rows["simulator"].map(skills), strongest_null="previous", **of_skill)
+    tables.write(compared / "simulators.csv", SIMULATORS, rows.to_dict("records"))
+    for name in skills:
         (compared / "simulators").mkdir(exist_ok=True)
         folder = (compared / name).rename(compared / "simulators" / name) if name != "tip" else compared
         if name == "tip":
             (compared / "tip" / "cases").rename(compared / "cases")
-        row = {"rms_mm": 0.3, "skill_strongest": skill, "strongest_null": "previous"}
+        # a skill over its own frames, that of no other
+        row = {"rms_mm": 0.3, "skill_strongest": 0.99, "strongest_null": "pinned"}
         tables.write(folder / "overall.csv", SUMMARY, [row])
         path = folder / "cases" / "c0" / "result.json"
         own = ["a faint frame", *["3 frames: with x and y turned most would not: are they RAS?"] * (name == "worse")]
