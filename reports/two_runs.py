@@ -74,7 +74,7 @@ class Verdict:
         for head, rows in lists.items():
             cut = f" (the first {most} of {len(rows)}; --json has all)" * (len(rows) > most)
             shown[head + cut] = rows.head(most)
-        return shown | {"Over all frames": pd.DataFrame(self.pooled), "Frame by frame": self.frames.by_column}
+        return shown | {"Over the frames of both": pd.DataFrame(self.pooled), "Frame by frame": self.frames.by_column}
 
     def lines(self) -> list[str]:
         """For a terminal: what differs, the verdict, the worst frames, tables; and the verdict again at the end."""
@@ -83,7 +83,7 @@ class Verdict:
             for head, table in self.tables().items()
             if len(table)
         ]
-        verdict = f"Verdict: {self.word.upper()}{f'. {self.paired}' if self.paired else ''}\n"
+        verdict = f"Verdict: {self.word.upper()}.{f' Pooled: {self.paired}' if self.paired else ''}\n"
         parts.insert(1 if self.differs else 0, verdict)
         parts[:0] = [f"{self.alike[0].upper()}{self.alike[1:]}.\n"] if self.alike else []
         gate = "exit 1, the gate closes" if self.closed else "exit 0, the gate stays open"

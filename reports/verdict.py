@@ -49,6 +49,8 @@ NEAR_MM, LEAST_COVERED = 1.0, 0.95
 them is missing: of wires that fold back in a third of the frames the median tip is right."""
 
 
+LEAST_TOLD = -10.0
+"""Skill below which a sentence gives no number: 3.3 times the rival's error."""
 FAR_BELOW = 0.7
 WORSE_BELOW = -0.1
 """Skill without an interval below which a wire is worse than its rival: an rms 5 % above that one's."""
@@ -151,7 +153,7 @@ def in_short(statistics: Mapping[str, Any]) -> str:
         return ""
     name = statistics.get("strongest_null") if number(statistics.get("skill_strongest")) != NOTHING else "centreline"
     rival = f"the predictor {predictor_label(str(name))!r}"
-    value = " ".join(filter(None, (f"skill {skill:.3f}", fewer_frames(statistics))))
+    value = " ".join(filter(None, (f"skill {_at_least(skill, f'{skill:.3f}')}", fewer_frames(statistics))))
     said = {
         TIPS_OFF: f"the tips lie off, judge by tip_median_mm ({value} against {rival})",
         WORSE: f"the simulated wire is worse than {rival} ({value})",
@@ -166,7 +168,7 @@ def _against(statistics: Mapping[str, Any]) -> str:
     rival, skill, least, _ = _skill(statistics)
     if not rival:
         return ""
-    value = " ".join(filter(None, (f"skill {number(skill)}", fewer_frames(statistics))))
+    value = " ".join(filter(None, (f"skill {_at_least(skill, number(skill))}", fewer_frames(statistics))))
     unsure = f"{value}, {_interval_of(least)}" if least <= 0.0 else value
     would = "it is not shown to be better" if least <= 0.0 else "it would be better"
     said = {
@@ -199,7 +201,12 @@ def _of_frames(statistics: Mapping[str, Any]) -> str:
 
 
 def _interval_of(least: float) -> str:
-    return f"its interval {'has no lower end' if least == -inf else f'reaches {number(least)}'}"
+    return f"its interval {'has no lower end' if least == -inf else f'reaches {_at_least(least, number(least))}'}"
+
+
+def _at_least(skill: float, text: str) -> str:
+    """A skill in words: how far below LEAST_TOLD it is says no more, since a rival's error may be next to nothing."""
+    return text if skill >= LEAST_TOLD else f"below {LEAST_TOLD:g}"
 
 
 def _rival(name: str) -> str:

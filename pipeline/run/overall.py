@@ -3,8 +3,8 @@
 Two runs are compared by the ratio of their errors on the frames that count in both, insertion by insertion.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping, Sequence, Set
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -44,6 +44,18 @@ def found_cases(out: Path) -> list[Found]:
     results = found_results(out)
     insertions = insertions_of(results)
     return [_found(out, result, insertions[result.case]) for result in results]
+
+
+def frames_in(found: Sequence[Found]) -> set[tuple[str, int]]:
+    """The frames of validation cases that count, by case and number."""
+    return {(case.result.case, number) for case in validation(found) for number in case.frames}
+
+
+def on_frames(found: Sequence[Found], frames: Set[tuple[str, int]]) -> list[Found]:
+    """The cases with these frames alone, of those that count."""
+    return [
+        replace(c, frames={n: frame for n, frame in c.frames.items() if (c.result.case, n) in frames}) for c in found
+    ]
 
 
 def golden_cases(out: Path) -> list[Found]:

@@ -6,7 +6,6 @@ planned frames: a simulator gains nothing by failing in the hard ones.
 """
 
 from collections.abc import Iterator, Mapping, Sequence, Set
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -15,7 +14,7 @@ import numpy as np
 from pipeline.compare import intervals
 from pipeline.model import Array
 from pipeline.run.another import with_another
-from pipeline.run.overall import Found, found_cases, overall, ratio, validation
+from pipeline.run.overall import Found, found_cases, frames_in, on_frames, overall, ratio, validation
 from pipeline.run.results import found_results
 from reports import tables
 from reports.case_files import copied_from_traces, listed
@@ -105,14 +104,9 @@ def side_by_side(out: Path, folders: Mapping[str, Path], embed: bool) -> list[st
 
 def _common(studies: Studies) -> Frames:
     """The frames, by case and number, that count for every simulator with at least FEW times the most frames."""
-    kept = [_numbers(found) for found in studies.values()]
+    kept = [frames_in(found) for found in studies.values()]
     most = max(map(len, kept), default=0)
     return set.intersection(*(one for one in kept if len(one) >= FEW * most)) if most else set()
-
-
-def _numbers(found: Sequence[Found]) -> set[tuple[str, int]]:
-    """The frames that count, by case and number."""
-    return {(case.result.case, number) for case in validation(found) for number in case.frames}
 
 
 def _alone(name: str, found: Sequence[Found], common: Frames) -> dict[str, Any]:
@@ -123,11 +117,8 @@ def _alone(name: str, found: Sequence[Found], common: Frames) -> dict[str, Any]:
     """
     used = validation(found)
     planned = {"frames": sum(case.result.frame_count for case in used), "frames_ok": 0, "within_1mm": 0.0}
-    alike = [
-        replace(c, frames={n: frame for n, frame in c.frames.items() if (c.result.case, n) in common}) for c in used
-    ]
-    own, skill = overall(found), overall(alike)
-    judged = own and common <= _numbers(found)
+    own, skill = overall(found), overall(on_frames(used, common))
+    judged = own and common <= frames_in(found)
     row = planned | own | {key: skill.get(key) if judged else None for key in OF_SKILL} | {"common_frames": len(common)}
     return {key: value for key, value in row.items() if key in SIMULATORS.names} | {"simulator": name}
 
@@ -143,7 +134,7 @@ def _where(
     points = {
         name: list(_points(folders[name], found, common))
         for name, found in studies.items()
-        if common <= _numbers(found)
+        if common <= frames_in(found)
     }
     for along, place in (("distance from the tip", 1), ("insertion depth", 2)):
         values = [np.max(part[place]) for parts in points.values() for part in parts]

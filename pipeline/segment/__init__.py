@@ -116,7 +116,7 @@ def segment(
     if len(region.thin):
         thin = balls(grid, region.thin, site.corner, region.levels, blur)
         add_balls(wall.values, np.asarray(grid.spacing_mm), thin, config.outer_mm)
-    other = brighter(wall.levels) + bright + uneven.warning(found.least)
+    other = brighter(wall.levels, wire_radius_mm is not None) + bright + uneven.warning(found.least)
     said: tuple[str, ...] = () if found.layer is None else (surrounded(found.layer, float(np.mean(grid.spacing_mm))),)
     said += cut_off(scan, found.distance, site.corner) + warning(open_ones) + valley.warning(grid, region.passing)
     said += other or bone.two_greys(grid, found.distance, site.corner, wall.levels, wall.blur_mm)

@@ -192,15 +192,18 @@ def _brightest(distance: Grid, corner: Index, levels: GreyLevels, blur_mm: float
     return levels.outside + BRIGHTER * (levels.at_seed - levels.outside) / max(float(share), 0.4)
 
 
-def brighter(levels: GreyLevels) -> tuple[str, ...]:
-    """One sentence for the report where the vessel is connected to something brighter, or none."""
+def brighter(levels: GreyLevels, wire: bool) -> tuple[str, ...]:
+    """One sentence for the report where the vessel is connected to something brighter, or none.
+
+    wire : the scan shows a wire, which is that itself where it is thick or bright.
+    """
     if not levels.foreign:
         return ()
     return (
         f"segment: {100 * levels.foreign:.0f} % of the deepest voxels are more than {BRIGHTER:g} times as bright as "
-        "the vessel at its seed: bone or metal hangs together with it; the wall's level is taken from the rest; where "
-        "they touch there is no wall: look at the picture, scan with smaller voxels, subtract the bone, or give the "
-        "lumen as a file (manifest key lumen)",
+        f"the vessel at its seed: {'the wire in it, or ' * wire}bone or metal hangs together with it; the wall's level "
+        "is taken from the rest; where they touch there is no wall: look at the picture, scan with smaller voxels, "
+        "subtract the bone, or give the lumen as a file (manifest key lumen)",
     )
 
 

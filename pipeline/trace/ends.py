@@ -13,7 +13,7 @@ from pipeline.trace.reach import end_range
 from pipeline.trace.section import fills_vessel
 from pipeline.trace.subtraction import Subtraction
 from pipeline.trace.tube import Tube
-from pipeline.trace.width import WIDE, wide_end
+from pipeline.trace.width import OUT_OF_ROUND, WIDE, as_fitted, oblong_end, wide_end
 
 EDGE_VOXELS, OUTSIDE_VOXELS = 2.0, -1.0
 """Distance from the scan's end within which a curve's end is no tip: traces of wires that leave the scan end 1.0 inside
@@ -159,12 +159,18 @@ def of_its_width(
 
     read, folded : of ``read_around``, as in ``of_the_ends``.
     """
-    wide = 0.0 if image.thick_slices or folded else wide_end(image, attempt.tube, points, read)
+    wide = oblong = 0.0
+    if not (image.thick_slices or folded):
+        fitted = as_fitted(image, attempt.tube, points)
+        wide, oblong = wide_end(image, attempt.tube, points, read, fitted), oblong_end(image, points, read, fitted)
     return (
         (wide > 0.0, FrameStatus.TRACE_AMBIGUOUS,
          f"an end {wide:.2f} times as wide as the line before it", f"{WIDE[0]:g} times at most",
          "look whether something else is at the tip (a bead, an air bubble of the reference, contrast medium that it "
          "lacks); if the wire's own end is so thick, give its curve (traces)"),
+        (oblong > 0.0, FrameStatus.TRACE_AMBIGUOUS,
+         f"an end {oblong:.1f} times as far out of round as the line before it", f"{OUT_OF_ROUND[1]:g} times at most",
+         "look whether the tip is folded back beside the wire, or another device lies there; give its curve (traces)"),
     )  # fmt: skip
 
 

@@ -5,6 +5,7 @@ for two that are 2.7 voxels apart; in contact it is 0.06, twice as bright.
 """
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipeline.model import Array
 from pipeline.trace.profile import INDEPENDENT_VOXELS
@@ -52,6 +53,11 @@ def read_around(image: Subtraction, points: Array, sigma: float) -> tuple[Array,
     return ring.reshape(ANGLES, len(points)), image.along(points)
 
 
+def second_harmonic(ring: Array) -> NDArray[np.complex128]:
+    """Of grey on rings (ANGLES, n), of each: twice the mean over the angles."""
+    return np.asarray(2.0 / ANGLES * np.exp(2j * PHI) @ ring)
+
+
 def out_of_round(image: Subtraction, points: Array, read: tuple[Array, Array]) -> tuple[Array, float]:
     """Second harmonic (n,) of the ring's grey over the grey on the axis, along a curve (n, 3), and its noise where the
     wire has its usual height.
@@ -60,7 +66,7 @@ def out_of_round(image: Subtraction, points: Array, read: tuple[Array, Array]) -
     """
     ring, grey = read
     step = float(np.mean(np.linalg.norm(np.diff(points, axis=0), axis=1)))
-    harmonic = 2.0 / ANGLES * np.exp(2j * PHI) @ ring
+    harmonic = second_harmonic(ring)
     width = min(len(points), max(1, round(OVER_MM / step)))
     window = np.ones(width) / width
     axis = np.convolve(grey, window, "same")

@@ -114,6 +114,25 @@ def test_the_verdict_follows_what_differs_and_ends_the_text(
     assert said.endswith("exit 1, the gate closes\n")
 
 
+def test_pooled_errors_of_both_are_over_the_same_frames(
+    first: Path, second: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A run that has lost its two hard cases of three had a better rms_mm."""
+    before = shutil.copytree(first, tmp_path / "before")
+    for name in ("b", "c"):
+        for out in (before, second):
+            path = out / "cases" / name / POINTS.file
+            rows = tables.read(path, POINTS)
+            tables.write(path, POINTS, rows.assign(error_mm=10.0 * rows["error_mm"]))
+        shutil.rmtree(second / "cases" / name)
+    assert main(["diff", str(before), str(second)]) == 1
+    said = capsys.readouterr().out
+    assert "WORSE" in said
+    shown = said[said.index("Over the frames of both:") : said.index("Frame by frame:")]
+    assert "frames_ok" in shown
+    assert " rms_mm" not in shown, "the same frames have the same errors"
+
+
 def test_small_changes_of_every_frame_close_the_gate_over_all(first: Path, second: Path, tmp_path: Path) -> None:
     """A tenth more of 0.1 mm is allowed in a frame; in all of them at once it is not."""
     times(second, 1.1)
