@@ -34,6 +34,12 @@ METHOD = fuzzy_region
 """How the vessel's voxels are found: (grid, seeds_mm, config) -> Region."""
 
 
+ON_THE_WIRE = (
+    "; or a seed lies on the wire, which this scan shows: name a point of the vessel beyond its tip, or beside it "
+    "(lumen_seed_mm), or give a scan without it (reference)"
+)
+
+
 @dataclass(frozen=True, eq=False)
 class _Found:
     """The vessel found from seeds: the grid with its contrast evened out, its region, and its wall on the site's box.
@@ -106,7 +112,10 @@ def segment(
     """
     config = config or SegmentConfig()
     scan, axes = in_memory_order(volume)
-    found = _found(scan, seeds_mm, config, wire_radius_mm is not None)
+    try:
+        found = _found(scan, seeds_mm, config, wire_radius_mm is not None)
+    except StageError as error:
+        raise StageError(error.status, f"{error}{ON_THE_WIRE * (wire_radius_mm is not None)}") from error
     if wire_radius_mm is not None:
         found = _around_wire(scan, found, seeds_mm, config, wire_radius_mm)
     grid, region, site, wall, blur = found.grid, found.region, found.site, found.wall, found.blur
