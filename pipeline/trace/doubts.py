@@ -15,7 +15,7 @@ from pipeline.trace.subtraction import CREST_VOXELS, Subtraction
 from pipeline.trace.tube import Tube
 from pipeline.trace.verdict import LEAST_SEEN, note_of
 from pipeline.trace.ways import goes_on_unseen
-from pipeline.trace.whose_end import nothing_beyond, of_one_device, of_one_line, with_marks
+from pipeline.trace.whose_end import nothing_beyond, of_full_height, of_one_device, of_one_line, with_marks
 
 OWN_NOISE = 0.25
 """Share of what counts as noise that changes from voxel to voxel, below which the rest is no noise: white noise has 1,
@@ -97,4 +97,4 @@ def doubted(image: Subtraction, attempt: Attempt, curve: Curve) -> Curve:
     if attempt.confirmed:  # a stated depth says where the wire ends
         return curve
     curve = of_one_device(image, attempt.tube, nothing_beyond(curve))
-    return of_one_line(image, attempt.tube, curve)
+    return of_one_line(image, attempt.tube, of_full_height(image, attempt.tube, curve))

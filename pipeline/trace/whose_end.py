@@ -7,12 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 from scipy.spatial import cKDTree
+from scipy.special import ndtr
 
 from pipeline.arrays.jets import gaussian_taps, smooth_voxels
 from pipeline.model import Array, Curve, arc_length
 from pipeline.status import FrameStatus
 from pipeline.trace.attempt import dense, tube_length
-from pipeline.trace.profile import BAND_VOXELS, LEAST_LEVEL, UNEVEN, Steps
+from pipeline.trace.profile import BAND_VOXELS, INDEPENDENT_VOXELS, LEAST_LEVEL, UNEVEN, Steps
 from pipeline.trace.region import voxels_of
 from pipeline.trace.subtraction import CREST_VOXELS, Subtraction
 from pipeline.trace.tube import Tube
@@ -36,6 +37,12 @@ GAP = "gap_mm"
 GAP_SHARE, SIDE_MM, MARK_MM = 0.6, 1.5, 0.75
 """Share of the line's grey on either side below which it has a gap, and how much line there is before it and beyond it
 at the least: blur leaves 0.3 to 0.5 in a gap of 1.5 mm (voxels of 0.5 mm), and beyond it a marker of 1 mm may lie."""
+FADE_MM, BODY_FROM, FADE_SIGMA_MM = 2.5, (4.0, 12.0), 0.75
+"""Length of the end that is held against the line 4 to 12 mm before it, and what is not known of a tip that fades: of a
+wire whose brightness falls to 0.3 over 3 mm the end seen is 1.1 to 1.8 mm short."""
+FADES, FADES_SIGMAS = 0.1, 3.5
+"""Share of its brightness, and standard deviations, by which an end fades: of 50 right ones none was beyond 0.08 and
+1.5; a jet ahead of the tip had 0.15 and 4.6."""
 BRIGHTER = 0.75
 """Which of the line's greys beyond a gap is held against it, by its rank."""
 LEAST_BEYOND_MM, MOST_BEYOND_MM = 2.0, 15.0
@@ -117,6 +124,40 @@ def of_one_device(image: Subtraction, tube: Tube, curve: Curve) -> Curve:
     return replace(
         curve, status=FrameStatus.TRACE_AMBIGUOUS, note=note, levels={**curve.levels, DIM_FROM_TIP: from_tip}
     )
+
+
+def _fade(image: Subtraction, tube: Tube) -> tuple[float, float]:
+    """By which share of its brightness a line is dimmer in its last FADE_MM than a wire that ends there at once, and in
+    standard deviations of that mean; 0 where the line is too short, or has steps in its brightness anyway.
+    """
+    line = dense(tube, 0.5 * image.voxel)
+    arc = arc_length(line)
+    from_tip, blur = arc[-1] - arc, float(np.hypot(CREST_VOXELS * image.voxel, tube.sigma))
+    body, end = (from_tip > BODY_FROM[0]) & (from_tip < BODY_FROM[1]), (from_tip > blur) & (from_tip < FADE_MM)
+    if len(tube.steps.edges) or body.sum() < MARK_OFF or end.sum() < 2:
+        return 0.0, 0.0
+    grey = image.along(line)
+    usual = max(float(np.median(grey[body])), 1e-9)
+    share = float(np.mean(ndtr(from_tip[end] / blur) - grey[end] / usual))
+    independent = max(1.0, (FADE_MM - blur) / (INDEPENDENT_VOXELS * image.voxel))
+    return share, share / (image.noise_in(CREST_VOXELS) / usual / np.sqrt(independent))
+
+
+def of_full_height(image: Subtraction, tube: Tube, curve: Curve) -> Curve:
+    """The curve, or the same as ambiguous where its end fades: a wire ground thin, or a jet of contrast medium ahead.
+
+    Frames at other depths tell, as of a dim end. Where it fades the tip is that much less sure.
+    """
+    share, sigmas = _fade(image, tube)
+    if curve.status is not FrameStatus.OK or not (share > FADES and sigmas > FADES_SIGMAS):
+        return curve
+    got = f"a line that fades by {100 * share:.0f} % in its last {FADE_MM:g} mm"
+    do = "look where the wire ends; state its opacity if its end is so, or insertion_mm"
+    return replace(
+        curve, status=FrameStatus.TRACE_AMBIGUOUS, tip_sigma_mm=float(np.hypot(curve.tip_sigma_mm, FADE_SIGMA_MM)),
+        note=note_of(got, f"{100 * FADES:.0f} % at most, or frames at other depths that show the same end", do),
+        levels={**curve.levels, DIM_FROM_TIP: FADE_MM},
+    )  # fmt: skip
 
 
 def first_gap_mm(grey: Array, arc: Array, noise: float) -> tuple[float, float]:

@@ -34,7 +34,7 @@ def own_dim_ends(frames: Sequence[Frame], voxel_mm: float) -> tuple[list[Frame],
     for n in np.flatnonzero(agreed):
         out[doubted[n]] = out[doubted[n]].cleared(cleared(curves[n]))
     said = (
-        f"the last {usual:.1f} mm of the wire are far dimmer than the rest in {int(agreed.sum())} frames, at depths of "
+        f"the last {usual:.1f} mm of the wire are dimmer than the rest in {int(agreed.sum())} frames, at depths of "
         f"{length[agreed].min():.1f} to {length[agreed].max():.1f} mm: taken for the wire's own end; were it a "
         "catheter's that was pushed with the wire, the tip would lie there"
     )
