@@ -42,12 +42,14 @@ def render_simulators(out_dir: Path, embed: bool = False) -> Path:
         row["cells"][0]["link"] = links[name]
     ours = _warnings(folders[OURS]) if OURS in folders else {}
     alone = {str(row["simulator"]): row for row in table.to_dict("records")}
+    few = set(_with_few(table)["simulator"])
     page = {
         "title": "Simulators side by side - wireval",
         "names": list(folders),
         "said": [
-            {"name": name, "link": links[name]} | _said(alone[name], folders[name], ours, copied.get(name, ""))
-            for name in folders
+            {"name": name, "link": links[name]}
+            | _said(alone[name], folder, ours, copied.get(name, ""), few=name in few)
+            for name, folder in folders.items()
         ],
         "ours": OURS,
         "interval": next(iter(table["interval"].dropna()), ""),
@@ -66,16 +68,19 @@ def folders_in(out_dir: Path) -> dict[str, Path]:
     return {name: out_dir / "simulators" / name if number else out_dir for number, name in enumerate(names)}
 
 
-def _said(alone: Mapping[Any, Any], folder: Path, ours: Mapping[str, list[str]], copied: str = "") -> dict[str, Any]:
+def _said(
+    alone: Mapping[Any, Any], folder: Path, ours: Mapping[str, list[str]], copied: str, *, few: bool
+) -> dict[str, Any]:
     """Badge and verdict of a simulator, and warnings of its cases that the same scans do not give with our wires.
 
     alone : its row of simulators.csv, which counts its frames also where nothing is pooled over them, and whose skill
     is over frames that count for all.     copied : that its wires were made from the traces.
+    few : it has too few frames to be judged beside the others.
     """
     whole = read_if_there(folder / OVERALL_FILE, SUMMARY)
     row = {str(name): value for name, value in whole.iloc[0].items()} if len(whole) else {}
     row |= {name: value for name, value in alone.items() if "strongest" in name}
-    if pd.isna(alone["skill_strongest"]):  # its few frames are not those of the others
+    if few:  # nor has it a skill against the centreline beside those of the others
         row.pop("skill", None)
     lines = [f"{case}: {t}" for case, said in _warnings(folder).items() for t in said if t not in ours.get(case, ())]
     missing, mixed, good = not_run_sentence(folder), mixed_settings(folder), alone["frames_ok"]
@@ -134,20 +139,27 @@ def in_common(rows: pd.DataFrame) -> str:
     """
     table = rows[rows["against"].isna()]
     shared, most = table["common_frames"].min(), table["frames_ok"].max()
-    some = table[table["frames_ok"] > 0]
-    unjudged = some["skill_strongest"].isna()
-    few = some[unjudged & (not unjudged.all())]
+    some, few = table[table["frames_ok"] > 0], _with_few(table)
     named = listed([f"{row['simulator']} ({row['frames_ok']} of {most})" for row in few.to_dict("records")])
     left_out = f"too few frames for a skill beside others: {named}" if named else ""
     if not shared <= _MOST_SHARED * most:
         return left_out
     fewer = some[(some["frames_ok"] < most) & ~some.index.isin(few.index)].to_dict("records")
     names = listed([f"{row['simulator']} ({row['frames_ok']})" for row in fewer])
+    whom = "others" if named else "simulators"
+    fewer_count = f": fewer than {most} count for {names}; a score without them tells more" if names else ""
     told = (
-        f"only {shared:.0f} of {most} frames count for all simulators, and skill_strongest beside others is over "
-        f"these: fewer than {most} count for {names}; a score without them tells more"
+        f"only {shared:.0f} of {most} frames count for all {whom}, and skill_strongest beside others is over "
+        f"these{fewer_count}"
     )
-    return "; ".join(filter(None, (told, left_out)))
+    return "; ".join(filter(None, (left_out, told)))
+
+
+def _with_few(table: pd.DataFrame) -> pd.DataFrame:
+    """The simulators that have frames, but no skill beside others that have one. table : their own rows."""
+    some = table[table["frames_ok"] > 0]
+    unjudged = some["skill_strongest"].isna()
+    return some[unjudged & (not unjudged.all())]
 
 
 def _never_nearest(where: pd.DataFrame) -> list[str]:

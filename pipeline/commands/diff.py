@@ -132,7 +132,7 @@ def _pooled(before: "Sequence[Found]", after: "Sequence[Found]") -> list[dict[st
     runs = before, after
     both = frames_in(before) & frames_in(after)
     shares = [{name: run[name] for name in OF_ALL if name in run} for run in map(overall, runs)]
-    old, new = (overall(on_frames(run, both) if both else run) | own for run, own in zip(runs, shares, strict=True))
+    old, new = (overall(on_frames(run, both)) | own for run, own in zip(runs, shares, strict=True))
     told = [column.name for column in SUMMARY if column.better or column.name == "strongest_null"]
     names = [name for name in told if name in old and name in new]
     rows = [{"column": name, "before": old[name], "after": new[name]} for name in names]

@@ -46,7 +46,8 @@ def cheapest_ways(cost: Array, spacing_mm: Array, start: Array) -> Ways | None:
     """Ways through voxels of finite cost (per mm) from that nearest to ``start`` (3,), an index; None without any.
 
     A step costs its length times the mean cost of its ends, as in skimage.graph.MCP_Geometric, which takes four times
-    as long: nearly all of it to number voxels that no way leads through.
+    as long where a hundredth of the box is lumen: nearly all of it to number voxels that no way leads through. Of a
+    million voxels in 200^3 both take as long.
     """
     # a margin of one voxel, so that none has neighbours beyond the array
     inside = np.pad(cost, 1, constant_values=np.inf)

@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from pipeline.run.another import copies, exchanged, with_another
+from pipeline.run.another import copies, with_another
+from pipeline.run.exchanged import exchanged
 from pipeline.run.overall import found_cases, frames_of, overall, shared_scans, strangers, validation
 from pipeline.run.results import Result, write_json
 from reports import tables
@@ -69,7 +70,7 @@ def aggregate(out: Path, run_info: dict[str, Any] | None = None, name: str = "ru
     tables.write(out / TIMINGS.file, TIMINGS, times)
     if run_info is not None:
         assumed = [*run_info.get("assumptions", ()), *shared_scans(found), *strangers(found)]
-        doubts = [*run_info.get("doubts", ()), *copies(validation(among)), *exchanged(among)]
+        doubts = [*run_info.get("doubts", ()), *copies(validation(among)), *exchanged(out, validation(among))]
         cases_of = {"assumptions": assumed, "doubts": doubts, "cases": [result.case for result in found]}
         write_json(out / name, run_info | cases_of | {"overall": whole})
     pooled = [] if mixed else frames_of(validation(cases))

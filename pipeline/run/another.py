@@ -15,7 +15,7 @@ from pipeline.arrays.polyline import at_arc, samples
 from pipeline.compare.config import CompareConfig
 from pipeline.compare.metrics import point_to_curve, scored
 from pipeline.compare.nulls import ANOTHER
-from pipeline.model import Array, arc_length
+from pipeline.model import Array
 from pipeline.run import ledger
 from pipeline.run.overall import Found, phantoms_of
 from reports.frames_file import read_arrays
@@ -30,9 +30,6 @@ STEP_MM = 0.5
 ALIKE = 0.3
 """Distance between two insertions' traces over their standard deviation, below which they are of one: two wires that
 lie alike are traced 1.4 times their standard deviation apart along each axis."""
-LOOKED_AT, FEWEST, NEARER = 6, 3, 0.5
-"""Frames, spread over a case, in which its simulated wire is held against other insertions' traces; how many of them
-must be nearer to one other insertion's, all but one; and by which share of the distance from its own."""
 MOST_OTHERS = 24
 """Most traces in a guess, those of the nearest depths: with all of 500 cases in one phantom it would take ten minutes,
 and the root mean square over 24 is known to about a seventh of itself (1 / sqrt(48))."""
@@ -42,16 +39,21 @@ Traces = Mapping[int, tuple[float, Array]]
 
 def with_another(out: Path, found: Sequence[Found]) -> list[Found]:
     """The cases, with the predictor's error added to the frames' rows where other insertions share the phantom."""
+    shared = of_one_phantom(found)
+    own = {case.result.case: cases for cases in shared for case in cases}
+    traces = {case.result.case: traces_of(out, case) for cases in shared for case in cases}
+    skip_mm = skip_mm_of(out, shared[0][0]) if shared else 0.0
+    return [_with_another(c, own[c.result.case], traces, skip_mm) if c.result.case in own else c for c in found]
+
+
+def of_one_phantom(found: Sequence[Found]) -> list[list[Found]]:
+    """The cases of each phantom that several share."""
     phantoms = phantoms_of(case.result for case in found)
     kin: dict[str, list[Found]] = {}
     for case in found:
         if case.result.case in phantoms:
             kin.setdefault(phantoms[case.result.case], []).append(case)
-    shared = [cases for cases in kin.values() if len(cases) > 1]
-    own = {case.result.case: cases for cases in shared for case in cases}
-    traces = {case.result.case: _traces(out, case) for cases in shared for case in cases}
-    skip_mm = _skip_mm(out, shared[0][0]) if shared else 0.0
-    return [_with_another(out, c, own[c.result.case], traces, skip_mm) if c.result.case in own else c for c in found]
+    return [cases for cases in kin.values() if len(cases) > 1]
 
 
 def copies(found: Sequence[Found]) -> list[str]:
@@ -77,13 +79,13 @@ def copies(found: Sequence[Found]) -> list[str]:
     ]
 
 
-def _skip_mm(out: Path, case: Found) -> float:
+def skip_mm_of(out: Path, case: Found) -> float:
     """``compare.skip_mm`` of a run, which is the same for all cases that are pooled."""
     config = read_json(out / "cases" / case.result.case / ledger.RESULT).get("config", {})
     return float(config.get("compare", {}).get("skip_mm", {}).get("value", CompareConfig().skip_mm))
 
 
-def _arrays(out: Path, case: Found, name: str) -> dict[int, Array]:
+def arrays_of(out: Path, case: Found, name: str) -> dict[int, Array]:
     """Curves of a case by frame, those of at least two points."""
     kept: Mapping[int, Mapping[str, Array]] = {}
     with suppress(OSError, KeyError, ValueError):  # a finished case whose ledger does not fit it counts as damaged
@@ -91,15 +93,13 @@ def _arrays(out: Path, case: Found, name: str) -> dict[int, Array]:
     return {number: arrays[name] for number, arrays in kept.items() if len(arrays.get(name, ())) > 1}
 
 
-def _traces(out: Path, case: Found) -> Traces:
+def traces_of(out: Path, case: Found) -> Traces:
     """The traces of a case that are to be trusted, whatever became of the simulated wire."""
-    curves = _arrays(out, case, "traced_mm")
+    curves = arrays_of(out, case, "traced_mm")
     return {number: (depth, curves[number]) for number, depth in case.traced_mm.items() if number in curves}
 
 
-def _with_another(
-    out: Path, case: Found, shared: Sequence[Found], traces: Mapping[str, Traces], skip_mm: float
-) -> Found:
+def _with_another(case: Found, shared: Sequence[Found], traces: Mapping[str, Traces], skip_mm: float) -> Found:
     """The case, with the RMS distance of other insertions' nearest traces to the frame's own trace in each row.
 
     shared : the cases of its phantom.
@@ -107,10 +107,6 @@ def _with_another(
     kin = [(c.insertion, traces[c.result.case]) for c in shared if c.insertion != case.insertion]
     own, frames = traces[case.result.case], dict(case.frames)
     others = Others(kin, own)
-    simulated = _arrays(out, case, "simulated_mm")
-    both = sorted(frames.keys() & own.keys() & simulated.keys())
-    looked_at = [both[n] for n in np.unique(np.linspace(0, len(both) - 1, LOOKED_AT).astype(int))] if both else []
-    fits = _fits_another([(*own[n], simulated[n]) for n in looked_at], others, skip_mm)
     for number in frames.keys() & own:
         depth, curve = own[number]
         arc, guesses = scored(samples(depth, STEP_MM), skip_mm), dict[str, tuple[float, int]]()
@@ -122,37 +118,7 @@ def _with_another(
             squares, count = np.sum([*guesses.values()], axis=0)
             row = {**frames[number].row, f"null_{ANOTHER}_rms_mm": float(np.sqrt(squares / count))}
             frames[number] = frames[number]._replace(row=row, guesses=guesses)
-    return replace(case, frames=frames, fits=fits)
-
-
-def _fits_another(seen: Sequence[tuple[float, Array, Array]], others: "Others", skip_mm: float) -> str:
-    """Whose traces simulated wires are far nearer to than to their own, in words; empty for nobody's.
-
-    seen : depth in mm, trace (n, 3) and simulated wire (m, 3) of a few frames.
-    """
-    nearer: dict[str, list[tuple[float, float]]] = {}
-    for depth, curve, wire in seen:
-        for insertion, trace in others.nearest(depth, curve):
-            # as long as both traces: the depths are nearly the same
-            arc = scored(samples(min(float(arc_length(c)[-1]) for c in (curve, trace, wire)), STEP_MM), skip_mm)
-            own, other = (float(np.mean(point_to_curve(at_arc(wire, arc), c)[0] ** 2)) for c in (curve, trace))
-            nearer.setdefault(insertion, []).append((own, other))
-    for insertion, squares in nearer.items():
-        own_mm, other_mm = np.sqrt(np.mean(squares, axis=0))
-        count = sum(other < NEARER**2 * own for own, other in squares)
-        if count >= max(FEWEST, len(seen) - 1) and other_mm < NEARER * own_mm:
-            return f"{insertion!r} ({other_mm:.2g} mm) than to those of its own ({own_mm:.2g} mm)"
-    return ""
-
-
-def exchanged(found: Sequence[Found]) -> list[str]:
-    """A sentence for each case whose simulated wires are those of another insertion, by what real wires they fit."""
-    return [
-        f"the simulated wires of case {case.result.case!r} lie far nearer to the real wires of insertion {case.fits}: "
-        "are its wires, its roll or its scans those of the other?"
-        for case in found
-        if case.fits
-    ]
+    return replace(case, frames=frames)
 
 
 def _reach_mm(traces: Traces, otherwise: float) -> float:

@@ -28,15 +28,13 @@ ALL = "(all)"
 class Found:
     """A case found on disk: its frames that count, by their numbers, and the depths of all whose trace is trusted.
 
-    insertion : that it belongs to, as ``insertions_of`` names it.     fits : another insertion, whose real wires its
-    simulated ones are far nearer to, in words.
+    insertion : that it belongs to, as ``insertions_of`` names it.
     """
 
     result: Result
     frames: Mapping[int, Scored]
     traced_mm: Mapping[int, float] = field(default_factory=dict)
     insertion: str = ""
-    fits: str = ""
 
 
 def found_cases(out: Path) -> list[Found]:

@@ -94,13 +94,14 @@ def _readings(points_mm: Array, unit: str) -> Iterator[tuple[str, Array]]:
     """Other readings of the numbers (point order, axes, units), each with its points; fewest changes first."""
     orders = {"": points_mm, "read from its other end (tip first)": points_mm[::-1]}
     spaces = {"": np.eye(3), "RAS": np.diag(MIRROR)}
-    spaces |= {f"written as {name}": np.eye(3)[list(axes)] for name, axes in AXES.items()}
+    written = {"": np.eye(3)} | {f"written as {name}": np.eye(3)[list(axes)] for name, axes in AXES.items()}
     stated = f", not in {unit}" * (unit != "mm")
     units = {"": 1.0} | {f"in {name}{stated}": factor for name, factor in other_units(unit).items()}
-    all_of_them = [tuple(zip(*named, strict=True)) for named in product(orders.items(), spaces.items(), units.items())]
-    for names, (points, axes, factor) in sorted(all_of_them, key=lambda one: sum(map(bool, one[0]))):
+    ways = product(orders.items(), spaces.items(), written.items(), units.items())
+    all_of_them = [tuple(zip(*named, strict=True)) for named in ways]
+    for names, (points, signs, axes, factor) in sorted(all_of_them, key=lambda one: sum(map(bool, one[0]))):
         if any(names):
-            yield " and ".join(filter(None, names)), points @ axes * factor
+            yield " and ".join(filter(None, names)), points @ axes @ signs * factor
 
 
 def not_to_depth(length_mm: float, depth_mm: float, tolerance_mm: float, stated: str = "mm") -> str:
@@ -128,7 +129,8 @@ def out_of_order(lengths_mm: Array, depths_mm: Array) -> list[tuple[int, int]]:
 def numbered_otherwise(lengths_mm: Array, depths_mm: Array) -> int:
     """By how many frames wires lie ahead of those whose depth they have; 0 where they have their own, or no other's.
 
-    lengths_mm, depths_mm : (n,) in the order of the frames, NaN where one has none.
+    lengths_mm, depths_mm : (n,) in the order of the frames, NaN where one has none. Where frames are equally far apart
+    that is the same as depths that are counted from elsewhere.
     """
 
     def off(lag: int) -> float:

@@ -90,11 +90,9 @@ def ends_in_nothing(image: Subtraction, tube: Tube, curve: Curve) -> Curve:
 
 def doubted(image: Subtraction, attempt: Attempt, curve: Curve) -> Curve:
     """The curve of an attempt with the first of all doubts, if there is any, as its status."""
+    curve = with_marks(image, attempt.tube, curve)  # for the other frames, whatever becomes of this one
     curve = ends_in_nothing(image, attempt.tube, faint_for_its_noise(curve))
-    if curve.status is not FrameStatus.OK:
-        return curve
-    curve = with_marks(image, attempt.tube, curve)
-    if attempt.confirmed:  # a stated depth says where the wire ends
+    if curve.status is not FrameStatus.OK or attempt.confirmed:  # a stated depth says where the wire ends
         return curve
     curve = of_one_device(image, attempt.tube, nothing_beyond(curve))
     return of_one_line(image, attempt.tube, of_full_height(image, attempt.tube, curve))

@@ -1,6 +1,7 @@
 """Is a curve's end that of the wire? A catheter may reach beyond the wire, a marker may lie beyond what is seen.
 
-Asked of frames without a stated depth alone: where there is one, it says where the wire ends.
+Asked of frames without a stated depth alone: where there is one, it says where the wire ends. What is as bright as the
+wire beyond its end is looked for in all, for what it says of the others.
 """
 
 from dataclasses import replace

@@ -20,10 +20,11 @@ J tips of 1.2 to 2 voxels radius had 1.17. A bead, a bubble or a jet of contrast
 
 FOLDED_VOXELS = 5.0
 """Length of the end whose roundness is looked at: as long as two strands beside each other are seen as one line."""
-OUT_OF_ROUND, USUAL = (0.05, 2.2), 0.75
+OUT_OF_ROUND, USUAL, WINDOWS = (0.05, 2.5), 0.75, 6
 """Least second harmonic over the grey on the axis, and over what most pieces of the body have (their upper quartile: a
-long fold is beside some of it), of an end beside which a strand lies. Folds of 2 to 6 mm, 1.6 to 2.1 voxels beside the
-wire, have 0.07 to 0.12, the body 0.02; noise alone is 2.2 times its upper quartile once in 800."""
+long fold is beside some of it), of an end beside which a strand lies; and how many pieces there must be: of few, noise
+makes one so much rounder than the end. Folds of 2 to 6 mm, 1.6 to 2.1 voxels beside the wire, have 0.07 to 0.12, the
+body 0.02; noise alone is 2.5 times its upper quartile once in 6,000."""
 
 
 def as_fitted(image: Subtraction, tube: Tube, points: Array) -> tuple[Array, Array]:
@@ -40,7 +41,7 @@ def oblong_end(image: Subtraction, points: Array, read: tuple[Array, Array], fit
     arc = arc_length(points)
     count = int(np.sum(arc[-1] - arc < FOLDED_VOXELS * image.voxel))
     body = np.flatnonzero(arc[-1] - arc > 2.0 * FOLDED_VOXELS * image.voxel)
-    if len(body) < 2 * count:
+    if len(body) < WINDOWS * count:
         return 0.0
     window = np.ones(count) / count
     turns = second_harmonic(read[0]) - second_harmonic(fitted[0])

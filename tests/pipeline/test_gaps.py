@@ -130,7 +130,15 @@ def marked(lengths: list[float], expected: float = NAN) -> list[Frame]:
 @pytest.mark.parametrize("expected", [NAN, 35.0], ids=["no depth", "a depth"])
 def test_a_curve_does_not_end_at_a_marker_that_stood_there_before(expected: float):
     """The marker of a catheter that stays where it is was 1.6 mm of wire, and ok, with a stated depth, too."""
-    found, _ = own_gaps(marked([20.0, 36.6, 40.0], expected), 0.4)
-    assert [f.status for f in found] == ["ok", "trace_ambiguous", "ok"], "the third goes past it"
-    assert "lay in frame 0, beyond 20.0 mm of wire" in found[1].message
-    assert all(f.ok for f in own_gaps(marked([33.0, 36.6], expected), 0.4)[0]), "seen by none"
+    seen = marked([20.0, 25.0, 36.6, 40.0], expected)
+    found, _ = own_gaps(seen, 0.4)
+    assert [f.status for f in found] == ["ok", "ok", "trace_ambiguous", "ok"], "the last goes past it"
+    assert "lies in frames 0 and 1, beyond 20.0 and 25.0 mm of wire" in found[2].message
+    assert all(f.ok for f in own_gaps(marked([33.0, 34.0, 36.6], expected), 0.4)[0]), "seen by none"
+    assert all(f.ok for f in own_gaps([replace(f, catheter_mm=36.5) for f in seen], 0.4)[0]), "a stated catheter's"
+
+
+@pytest.mark.parametrize("lengths", [[20.0, 36.6], [20.0, 20.4, 36.6]])
+def test_a_marker_seen_from_one_depth_may_be_the_wires_own_tip(lengths: list[float]):
+    """Its own tip beyond 13 mm that nobody saw, in a frame of the same depth, made a right frame ambiguous."""
+    assert all(f.ok for f in own_gaps(marked(lengths), 0.4)[0])

@@ -19,7 +19,8 @@ import SimpleITK as sitk
 
 from pipeline.cli import main
 from pipeline.run import ledger
-from pipeline.run.another import copies, exchanged, with_another
+from pipeline.run.another import copies, with_another
+from pipeline.run.exchanged import exchanged
 from pipeline.run.overall import found_cases, phantoms_of, strangers
 
 INSERTIONS, FRAMES = 3, 4
@@ -266,7 +267,7 @@ def test_scans_of_one_wire_under_several_names_are_told(out: Path) -> None:
     """Written again with other noise they were three insertions: a narrow interval, and a predictor that is a copy."""
     found = with_another(out, found_cases(out))
     assert copies(found) == []
-    assert exchanged(found) == []
+    assert exchanged(out, found) == []
     alike = [
         replace(
             case,

@@ -31,7 +31,7 @@ END_MM = 2.0
 def own_gaps(frames: Sequence[Frame], voxel_mm: float) -> tuple[list[Frame], list[str]]:
     """The frames, cleared of the doubt about a gap where they agree on it; and a warning for each other gap's frame.
 
-    Frames with a stated depth are left out: it says where the wire ends.
+    Of gaps, frames with a stated depth are left out: it says where the wire ends.
     """
     out = list(frames)
     with_gap = [n for n, f in enumerate(out) if np.isnan(f.expected_mm) and f.curve and BEYOND_GAP in f.curve.levels]
@@ -87,20 +87,27 @@ def _lay_there(curve: Curve, other: Curve, voxel_mm: float) -> bool:
 
 
 def _past_marks(frame: Frame, frames: Sequence[Frame], voxel_mm: float) -> Frame:
-    """The frame; failed where its curve ends at a mark that stood there when the wire was farther back."""
+    """The frame; failed where its curve ends at a mark that stands there in frames of two smaller depths.
+
+    One frame alone may show its own tip beyond what is not seen of its wire; a catheter that is stated explains it.
+    """
     curve = frame.trusted_curve
-    if curve is None:
+    if curve is None or frame.catheter_mm > 0.0:
         return frame
     arc = arc_length(curve.points_mm)
     end = cKDTree(curve.points_mm[arc > arc[-1] - END_MM])
-    for other in frames:
-        if other.curve is None or other.curve.length_mm > curve.length_mm - CAME_NEARER_MM:
-            continue
-        if np.any(end.query(other.curve.marks_mm.reshape(-1, 3))[0] < STAYED_VOXELS * voxel_mm):
-            note = (
-                f"trace: wire: got an end where something as bright as the wire lay in frame {other.index}, beyond "
-                f"{other.curve.length_mm:.1f} mm of wire; expected an end with nothing there before; look for a "
-                "catheter's marker; state the catheter and its insertion_mm"
-            )
-            return frame.failed("trace", FrameStatus.TRACE_AMBIGUOUS, note)
-    return frame
+    seen = {
+        other.curve.length_mm: other.index
+        for other in frames
+        if other.curve is not None
+        and other.curve.length_mm < curve.length_mm - CAME_NEARER_MM
+        and np.any(end.query(other.curve.marks_mm.reshape(-1, 3))[0] < STAYED_VOXELS * voxel_mm)
+    }
+    if not seen or max(seen) - min(seen) < CAME_NEARER_MM:
+        return frame
+    note = (
+        f"trace: wire: got an end where something as bright as the wire lies in frames {seen[min(seen)]} and "
+        f"{seen[max(seen)]}, beyond {min(seen):.1f} and {max(seen):.1f} mm of wire; expected an end with nothing there "
+        "before; look for a catheter's marker; state the catheter and its insertion_mm"
+    )
+    return frame.failed("trace", FrameStatus.TRACE_AMBIGUOUS, note)

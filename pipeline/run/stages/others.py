@@ -54,7 +54,7 @@ def _in_another_order(frames: Sequence[Frame]) -> list[str]:
         lag = numbered_otherwise(np.array(lengths), depths)
         return [
             f"wires have the depths of other frames, that of frame n the depth of frame n {'+' if lag > 0 else '-'} "
-            f"{abs(lag)}: are the files numbered as the frames are?"
+            f"{abs(lag)}: are the files numbered as the frames are, and depths counted from the same place?"
         ] * bool(lag)
     here, deeper = (f"{lengths[n]:.2f} mm long in frame {n}, {frames[n].depth_mm:.2f} mm deep" for n in found[0])
     return [
