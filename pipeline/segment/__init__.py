@@ -98,6 +98,17 @@ def _around_wire(grid: Grid, found: _Found, seeds_mm: ArrayLike, config: Segment
     return vessel if swallowed(found.distance, vessel.distance) else found
 
 
+def _beside_wire(grid: Grid, seeds_mm: ArrayLike, config: SegmentConfig, wire_mm: float | None) -> _Found:
+    """The vessel, where the scan may show a wire of radius ``wire_mm`` in it."""
+    if wire_mm is None:
+        return _found(grid, seeds_mm, config, wire=False)
+    try:
+        found = _found(grid, seeds_mm, config, wire=True)
+    except StageError as error:
+        raise StageError(error.status, f"{error}{ON_THE_WIRE}") from error
+    return _around_wire(grid, found, seeds_mm, config, wire_mm)
+
+
 def segment(
     volume: Volume, seeds_mm: ArrayLike, config: SegmentConfig | None = None, wire_radius_mm: float | None = None
 ) -> Lumen:
@@ -112,12 +123,7 @@ def segment(
     """
     config = config or SegmentConfig()
     scan, axes = in_memory_order(volume)
-    try:
-        found = _found(scan, seeds_mm, config, wire_radius_mm is not None)
-    except StageError as error:
-        raise StageError(error.status, f"{error}{ON_THE_WIRE * (wire_radius_mm is not None)}") from error
-    if wire_radius_mm is not None:
-        found = _around_wire(scan, found, seeds_mm, config, wire_radius_mm)
+    found = _beside_wire(scan, seeds_mm, config, wire_radius_mm)
     grid, region, site, wall, blur = found.grid, found.region, found.site, found.wall, found.blur
     open_ones, bright = side_by_side(
         lambda: contacts(found.distance), lambda: bone.touching(grid, found.distance, site.corner, wall.levels)
