@@ -74,8 +74,8 @@ def _said(
     """Badge and verdict of a simulator, and warnings of its cases that the same scans do not give with our wires.
 
     alone : its row of simulators.csv, which counts its frames also where nothing is pooled over them, and whose skill
-    is over frames that count for all.     copied : that its wires were made from the traces.
-    few : it has too few frames to be judged beside the others.
+    is over frames that count for all.     copied : that its wires were made from the traces.     few : it has too few
+    frames to be judged beside the others.
     """
     whole = read_if_there(folder / OVERALL_FILE, SUMMARY)
     row = {str(name): value for name, value in whole.iloc[0].items()} if len(whole) else {}

@@ -41,6 +41,8 @@ at the least: blur leaves 0.3 to 0.5 in a gap of 1.5 mm (voxels of 0.5 mm), and 
 FADE_MM, BODY_FROM, FADE_SIGMA_MM = 2.5, (4.0, 12.0), 0.75
 """Length of the end that is held against the line 4 to 12 mm before it, and what is not known of a tip that fades: of a
 wire whose brightness falls to 0.3 over 3 mm the end seen is 1.1 to 1.8 mm short."""
+FEWEST = (4, 2)
+"""Samples of body and end that there must be, half a voxel apart."""
 FADES, FADES_SIGMAS = 0.1, 3.5
 """Share of its brightness, and standard deviations, by which an end fades: of 50 right ones none was beyond 0.08 and
 1.5; a jet ahead of the tip had 0.15 and 4.6."""
@@ -135,7 +137,7 @@ def _fade(image: Subtraction, tube: Tube) -> tuple[float, float]:
     arc = arc_length(line)
     from_tip, blur = arc[-1] - arc, float(np.hypot(CREST_VOXELS * image.voxel, tube.sigma))
     body, end = (from_tip > BODY_FROM[0]) & (from_tip < BODY_FROM[1]), (from_tip > blur) & (from_tip < FADE_MM)
-    if len(tube.steps.edges) or body.sum() < MARK_OFF or end.sum() < 2:
+    if len(tube.steps.edges) or body.sum() < FEWEST[0] or end.sum() < FEWEST[1]:
         return 0.0, 0.0
     grey = image.along(line)
     usual = max(float(np.median(grey[body])), 1e-9)
@@ -179,8 +181,8 @@ def of_one_line(image: Subtraction, tube: Tube, curve: Curve) -> Curve:
     """The curve with how much of it lies beyond a gap, ambiguous where that is longer than a wire's tip, or a mark.
 
     A second device that faces the wire's tip looks like the wire beyond a gap, and so does the marker at the end of a
-    catheter that reaches beyond the wire. Frames at other depths tell: a gap of
-    the wire's own goes with the tip, one that a streak makes stays where it is.
+    catheter that reaches beyond the wire. Frames at other depths tell: a gap of the wire's own goes with the tip, one
+    that a streak makes stays where it is.
     """
     line = dense(tube, 0.5 * image.voxel)
     arc = arc_length(line)

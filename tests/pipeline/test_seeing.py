@@ -127,6 +127,9 @@ def test_what_can_be_seen_is_traced(case, seed):
             ("a bead or a jet of contrast ahead of the tip", 5, "TRACE_AMBIGUOUS"),  # the bead taken for wire, and ok
             ("a bead or a jet of contrast ahead of the tip", 3, "TRACE_AMBIGUOUS"),  # the same, without a reference
             ("a bead or a jet of contrast ahead of the tip", 12, "TRACE_AMBIGUOUS"),  # 6 voxels of the jet, and ok
+            ("a bead or a jet of contrast ahead of the tip", 1612, "TRACE_AMBIGUOUS"),  # 4 voxels of a jet that fades
+            ("a bead or a jet of contrast ahead of the tip", 1818, "TRACE_AMBIGUOUS"),  # 6 voxels, the same
+            ("a bead or a jet of contrast ahead of the tip", 1735, "TRACE_AMBIGUOUS"),  # round a bead, and ok
             ("no wire, no reference", 421, "TRACE_LOW_CONTRAST"),  # 2 mm of noise, narrower than the scanner can see
             ("no wire, no reference", 1210, "TRACE_LOW_CONTRAST"),  # 2 mm of noise, as wide as a wire, and ok
         ]
