@@ -98,9 +98,14 @@ def warnings_of(folder: Path) -> list[str]:
         return []
 
 
-def copied_from_traces(out_dir: Path) -> str:
-    """The warning that a run's simulated wires were made from the traces; empty where no case has it."""
-    said = (f"{case.name}: {text}" for case in find_cases(out_dir) for text in warnings_of(case))
+def warnings_in(out_dir: Path) -> dict[str, list[str]]:
+    """What each case below an output folder was warned of."""
+    return {case.name: warnings_of(case) for case in find_cases(out_dir)}
+
+
+def copied_from_traces(warnings: Mapping[str, Sequence[str]]) -> str:
+    """The warning that simulated wires were made from the traces; empty where no case has it. warnings : by case."""
+    said = (f"{case}: {text}" for case, texts in warnings.items() for text in texts)
     return next((text for text in said if MADE_FROM_TRACES in text), "")
 
 

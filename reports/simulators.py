@@ -1,6 +1,6 @@
 """The page of several simulators side by side, from simulators.csv and where.csv."""
 
-from collections.abc import Container, Mapping
+from collections.abc import Container, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -8,21 +8,13 @@ from urllib.parse import quote
 import pandas as pd
 
 from reports import _content
-from reports.case_files import (
-    copied_from_traces,
-    counted,
-    find_cases,
-    listed,
-    not_reached,
-    not_run_sentence,
-    warnings_of,
-)
+from reports.case_files import copied_from_traces, counted, listed, not_reached, not_run_sentence, warnings_in
 from reports.figures.simulators import SimulatorFiles, leads
 from reports.origin import mixed_settings
 from reports.page import draw_sections, write_page
 from reports.schema import OVERALL_FILE, SIMULATORS, SUMMARY, WHERE, Column
 from reports.tables import read_if_there
-from reports.verdict import COPIED, OURS, TIPS_OFF, badge, tips_off, verdict
+from reports.verdict import COPIED, NEVER_NEAREST, OURS, badge, tips_off, verdict
 
 PAGE = "simulators.html"
 _MOST_WARNINGS = 5
@@ -33,14 +25,15 @@ _MOST_SHARED = 0.75
 def render_simulators(out_dir: Path, embed: bool = False) -> Path:
     """Draw the figure and write simulators.html; returns its path. embed : pictures and numbers into the page."""
     files = SimulatorFiles(*(read_if_there(out_dir / table.file, table) for table in (SIMULATORS, WHERE)))
-    copied = {name: said for name, folder in folders_in(out_dir).items() if (said := copied_from_traces(folder))}
+    warnings = {name: warnings_in(folder) for name, folder in folders_in(out_dir).items()}
+    copied = {name: said for name, own in warnings.items() if (said := copied_from_traces(own))}
     table, columns = _one_table(files.simulators, copied)
     grid = _content.grid(table, columns, bad=_doubtful(table, copied), nothing=_content.NOTHING)
     folders = {name: folders_in(out_dir)[name] for name in table["simulator"]}
     links = {name: quote((folder / "index.html").relative_to(out_dir).as_posix()) for name, folder in folders.items()}
     for row, name in zip(grid["rows"], table["simulator"], strict=True):
         row["cells"][0]["link"] = links[name]
-    ours = _warnings(folders[OURS]) if OURS in folders else {}
+    alien = {name: _not_ours(own, warnings.get(OURS, {})) for name, own in warnings.items()}
     alone = {str(row["simulator"]): row for row in table.to_dict("records")}
     few = set(_with_few(table)["simulator"])
     page = {
@@ -48,7 +41,7 @@ def render_simulators(out_dir: Path, embed: bool = False) -> Path:
         "names": list(folders),
         "said": [
             {"name": name, "link": links[name]}
-            | _said(alone[name], folder, ours, copied.get(name, ""), few=name in few)
+            | _said(alone[name], folder, alien[name], copied.get(name, ""), few=name in few)
             for name, folder in folders.items()
         ],
         "ours": OURS,
@@ -68,10 +61,8 @@ def folders_in(out_dir: Path) -> dict[str, Path]:
     return {name: out_dir / "simulators" / name if number else out_dir for number, name in enumerate(names)}
 
 
-def _said(
-    alone: Mapping[Any, Any], folder: Path, ours: Mapping[str, list[str]], copied: str, *, few: bool
-) -> dict[str, Any]:
-    """Badge and verdict of a simulator, and warnings of its cases that the same scans do not give with our wires.
+def _said(alone: Mapping[Any, Any], folder: Path, lines: Sequence[str], copied: str, *, few: bool) -> dict[str, Any]:
+    """Badge and verdict of a simulator, and warnings of its cases: these ``lines``.
 
     alone : its row of simulators.csv, which counts its frames also where nothing is pooled over them, and whose skill
     is over frames that count for all.     copied : that its wires were made from the traces.     few : it has too few
@@ -82,7 +73,6 @@ def _said(
     row |= {name: value for name, value in alone.items() if "strongest" in name}
     if few:  # nor has it a skill against the centreline beside those of the others
         row.pop("skill", None)
-    lines = [f"{case}: {t}" for case, said in _warnings(folder).items() for t in said if t not in ours.get(case, ())]
     missing, mixed, good = not_run_sentence(folder), mixed_settings(folder), alone["frames_ok"]
     failed = f"On {good} of {alone['frames']} frames: " if good < alone["frames"] else ""
     status = "cases missing" if missing else "frames failed" if failed else "settings differ" if mixed else "ok"
@@ -100,9 +90,9 @@ def _said(
     }
 
 
-def _warnings(folder: Path) -> dict[str, list[str]]:
-    """Of each case below an output folder."""
-    return {case.name: warnings_of(case) for case in find_cases(folder)}
+def _not_ours(warnings: Mapping[str, list[str]], ours: Mapping[str, list[str]]) -> list[str]:
+    """Warnings, by case, that the same scans do not give with our wires, a line each."""
+    return [f"{case}: {text}" for case, said in warnings.items() for text in said if text not in ours.get(case, ())]
 
 
 def _one_table(rows: pd.DataFrame, copied: Container[str]) -> tuple[pd.DataFrame, list[Column]]:
@@ -164,7 +154,7 @@ def _with_few(table: pd.DataFrame) -> pd.DataFrame:
 
 def _never_nearest(where: pd.DataFrame) -> list[str]:
     """Who is never the nearest, each with the reason. where : of where.csv."""
-    told = where[where["lead"].isin([TIPS_OFF, COPIED])][["simulator", "lead"]].drop_duplicates()
+    told = where[where["lead"].isin(NEVER_NEAREST)][["simulator", "lead"]].drop_duplicates()
     return sorted(f"{row['simulator']} ({row['lead']})" for row in told.to_dict("records"))
 
 

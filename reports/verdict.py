@@ -41,6 +41,8 @@ OURS = "wireval"
 WORSE = "worse than a guess"
 NO_BETTER, NOT_SHOWN = "no better than a guess", "not shown to be better than a guess"
 TIPS_OFF, COPIED = "the tips lie off", "made from the traces"
+NEVER_NEAREST = TIPS_OFF, COPIED
+"""Why a simulator leads nowhere, whatever its distances to the traced wire."""
 TIPS_OFF_RATIO, TIPS_OFF_MM = 3.0, 0.5
 """From which tip_median_mm on, over rms_mm and in mm, the tips contradict it. The 27 scenes of the catalogue, replayed
 to the traced length, have ratios up to 2.4."""

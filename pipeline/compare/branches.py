@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from skimage.measure import label
 
-from pipeline.compare.ways import cheapest_ways
+from pipeline.compare.ways import cheapest_ways, nearest
 from pipeline.model import Array
 from solver import Grid
 
@@ -37,7 +37,7 @@ class Branches:
 
     def at(self, point_mm: Array) -> set[int]:
         """The branches that a point lies in: one, or all that meet where it lies."""
-        own = {int(self.names[np.argmin(np.sum((self.inside_mm - point_mm) ** 2, axis=1))])}
+        own = {int(self.names[nearest(self.inside_mm, point_mm)])}
         for middle, radius, names in self.meetings:
             if np.linalg.norm(point_mm - middle) <= radius:
                 own |= names

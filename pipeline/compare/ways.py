@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from itertools import product
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,9 +38,9 @@ class Ways:
         return self.voxels[way[::-1]]
 
 
-def nearest(voxels: NDArray[np.int64], index: Array) -> int:
-    """The number of the voxel (of n, 3) that is nearest to a place, in voxels."""
-    return int(np.argmin(np.sum((voxels - index) ** 2, axis=1)))
+def nearest(points: NDArray[Any], place: Array) -> int:
+    """The number of the point, of (n, 3), that is nearest to a place (3,) in the same unit."""
+    return int(np.argmin(np.sum((points - place) ** 2, axis=1)))
 
 
 def cheapest_ways(cost: Array, spacing_mm: Array, start: Array) -> Ways | None:
@@ -65,9 +66,9 @@ def _steps(at: NDArray[np.int64], costs: Array, shape: tuple[int, ...], spacing_
     """What the steps between voxels cost, each once; at (n,) : their places in an array of that shape."""
     numbers = np.full(np.prod(shape), -1, np.int32)
     numbers[at] = np.arange(len(at))
-    found = []
+    found, middle = [], np.ravel_multi_index((1, 1, 1), shape)
     for step in STEPS:
-        to = numbers[at + np.ravel_multi_index(tuple(step + 1), shape) - np.ravel_multi_index((1, 1, 1), shape)]
+        to = numbers[at + np.ravel_multi_index(tuple(step + 1), shape) - middle]
         here = np.flatnonzero(to >= 0).astype(np.int32)
         there = to[here]
         length = float(np.linalg.norm(step * spacing_mm))

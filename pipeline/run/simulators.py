@@ -17,7 +17,7 @@ from pipeline.run.another import with_another
 from pipeline.run.overall import Found, found_cases, frames_in, on_frames, overall, ratio, validation
 from pipeline.run.results import found_results
 from reports import tables
-from reports.case_files import copied_from_traces, listed
+from reports.case_files import copied_from_traces, listed, warnings_in
 from reports.html import render_index
 from reports.origin import mixed_settings
 from reports.schema import FAILURES, POINTS, SIMULATORS, WHERE
@@ -49,8 +49,9 @@ def write_comparison(out: Path, folders: Mapping[str, Path]) -> list[str]:
     mixed = mixed_settings(*folders.values())
     pairs = [(one, other) for one in studies for other in studies if one != other and not mixed]
     common = _common(studies)
-    rows = [_alone(name, found, common) for name, found in studies.items()]
-    copied = {name for name, folder in folders.items() if copied_from_traces(folder)}
+    judged = {name: found for name, found in studies.items() if common <= frames_in(found)}
+    rows = [_alone(name, found, common, name in judged) for name, found in studies.items()]
+    copied = {name for name, folder in folders.items() if copied_from_traces(warnings_in(folder))}
     off = {row["simulator"]: TIPS_OFF for row in rows if tips_off(row)} | dict.fromkeys(copied, COPIED)
     sentences = [mixed] * bool(mixed)
     for one, other in pairs:
@@ -64,7 +65,7 @@ def write_comparison(out: Path, folders: Mapping[str, Path]) -> list[str]:
                 said = both.sentence.replace("the second run / the first", f"{one} / {OURS}")
                 sentences.append("; ".join([said, *caveat]))
     tables.write(out / SIMULATORS.file, SIMULATORS, rows)
-    tables.write(out / WHERE.file, WHERE, [] if mixed else list(_where(folders, studies, common, off)))
+    tables.write(out / WHERE.file, WHERE, [] if mixed else list(_where(folders, judged, common, off)))
     none = [row["simulator"] for row in rows if row.get("frames_ok") == 0]
     if none and common and not mixed:
         sentences.append(f"who is nearest where is left out: no frame counts for {listed(none)}")
@@ -109,33 +110,27 @@ def _common(studies: Studies) -> Frames:
     return set.intersection(*(one for one in kept if len(one) >= FEW * most)) if most else set()
 
 
-def _alone(name: str, found: Sequence[Found], common: Frames) -> dict[str, Any]:
+def _alone(name: str, found: Sequence[Found], common: Frames, judged: bool) -> dict[str, Any]:
     """A simulator's numbers as in its own overall.csv; where no frame counts, its planned frames with none ok.
 
     Skill is over ``common`` frames: who lacks some would be held against another predictor, or on easier ones; who
-    lacks most has none.
+    lacks most is not judged.
     """
     used = validation(found)
     planned = {"frames": sum(case.result.frame_count for case in used), "frames_ok": 0, "within_1mm": 0.0}
     own, skill = overall(found), overall(on_frames(used, common))
-    judged = own and common <= frames_in(found)
-    row = planned | own | {key: skill.get(key) if judged else None for key in OF_SKILL} | {"common_frames": len(common)}
+    beside = {key: skill.get(key) if own and judged else None for key in OF_SKILL}
+    row = planned | own | beside | {"common_frames": len(common)}
     return {key: value for key, value in row.items() if key in SIMULATORS.names} | {"simulator": name}
 
 
-def _where(
-    folders: Mapping[str, Path], studies: Studies, common: Frames, off: Mapping[str, str]
-) -> Iterator[dict[str, Any]]:
+def _where(folders: Mapping[str, Path], judged: Studies, common: Frames, off: Off) -> Iterator[dict[str, Any]]:
     """For each bin of the distance from the tip and of the depth, every simulator's error and who is nearest.
 
     off : simulators whose tips lie off, or that were made from the traces: distances to the traced wire do not show
-    that, so these are never the nearest. One that lacks most of the frames is left out.
+    that, so these are never the nearest.     judged : those that have all ``common`` frames.
     """
-    points = {
-        name: list(_points(folders[name], found, common))
-        for name, found in studies.items()
-        if common <= frames_in(found)
-    }
+    points = {name: list(_points(folders[name], found, common)) for name, found in judged.items()}
     for along, place in (("distance from the tip", 1), ("insertion depth", 2)):
         values = [np.max(part[place]) for parts in points.values() for part in parts]
         if not values:
@@ -175,9 +170,7 @@ def _pieces(parts: Sequence[Part], place: int, low: float, high: float) -> list[
     return pieces
 
 
-def _rows(
-    head: dict[str, Any], found: Mapping[str, Sequence[Piece]], off: Mapping[str, str]
-) -> Iterator[dict[str, Any]]:
+def _rows(head: dict[str, Any], found: Mapping[str, Sequence[Piece]], off: Off) -> Iterator[dict[str, Any]]:
     """A row for each simulator in a bin; the nearest one that is not ``off`` also gets its lead and how sure it is."""
     mean = {name: sum(p.squares for p in pieces) / sum(p.points for p in pieces) for name, pieces in found.items()}
     # of those that are the same but for rounding the first that was given, run after run

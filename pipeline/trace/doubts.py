@@ -15,7 +15,7 @@ from pipeline.trace.subtraction import CREST_VOXELS, Subtraction
 from pipeline.trace.tube import Tube
 from pipeline.trace.verdict import LEAST_SEEN, note_of
 from pipeline.trace.ways import goes_on_unseen
-from pipeline.trace.whose_end import nothing_beyond, of_full_height, of_one_device, of_one_line, with_marks
+from pipeline.trace.whose_end import along_line, nothing_beyond, of_full_height, of_one_device, of_one_line, with_marks
 
 OWN_NOISE = 0.25
 """Share of what counts as noise that changes from voxel to voxel, below which the rest is no noise: white noise has 1,
@@ -94,5 +94,6 @@ def doubted(image: Subtraction, attempt: Attempt, curve: Curve) -> Curve:
     curve = ends_in_nothing(image, attempt.tube, faint_for_its_noise(curve))
     if curve.status is not FrameStatus.OK or attempt.confirmed:  # a stated depth says where the wire ends
         return curve
+    read = along_line(image, attempt.tube)
     curve = of_one_device(image, attempt.tube, nothing_beyond(curve))
-    return of_one_line(image, attempt.tube, of_full_height(image, attempt.tube, curve))
+    return of_one_line(image, of_full_height(image, attempt.tube, curve, read), read)

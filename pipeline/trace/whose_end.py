@@ -129,29 +129,33 @@ def of_one_device(image: Subtraction, tube: Tube, curve: Curve) -> Curve:
     )
 
 
-def _fade(image: Subtraction, tube: Tube) -> tuple[float, float]:
+def along_line(image: Subtraction, tube: Tube) -> tuple[Array, Array]:
+    """Arc length (n,) in mm along a tube's line, half a voxel from one sample to the next, and its grey."""
+    line = dense(tube, 0.5 * image.voxel)
+    return arc_length(line), image.along(line)
+
+
+def _fade(image: Subtraction, tube: Tube, arc: Array, grey: Array) -> tuple[float, float]:
     """By which share of its brightness a line is dimmer in its last FADE_MM than a wire that ends there at once, and in
     standard deviations of that mean; 0 where the line is too short, or has steps in its brightness anyway.
     """
-    line = dense(tube, 0.5 * image.voxel)
-    arc = arc_length(line)
     from_tip, blur = arc[-1] - arc, float(np.hypot(CREST_VOXELS * image.voxel, tube.sigma))
     body, end = (from_tip > BODY_FROM[0]) & (from_tip < BODY_FROM[1]), (from_tip > blur) & (from_tip < FADE_MM)
     if len(tube.steps.edges) or body.sum() < FEWEST[0] or end.sum() < FEWEST[1]:
         return 0.0, 0.0
-    grey = image.along(line)
     usual = max(float(np.median(grey[body])), 1e-9)
     share = float(np.mean(ndtr(from_tip[end] / blur) - grey[end] / usual))
     independent = max(1.0, (FADE_MM - blur) / (INDEPENDENT_VOXELS * image.voxel))
     return share, share / (image.noise_in(CREST_VOXELS) / usual / np.sqrt(independent))
 
 
-def of_full_height(image: Subtraction, tube: Tube, curve: Curve) -> Curve:
+def of_full_height(image: Subtraction, tube: Tube, curve: Curve, read: tuple[Array, Array]) -> Curve:
     """The curve, or the same as ambiguous where its end fades: a wire ground thin, or a jet of contrast medium ahead.
 
-    Frames at other depths tell, as of a dim end. Where it fades the tip is that much less sure.
+    Frames at other depths tell, as of a dim end. Where it fades the tip is that much less sure. read : of
+    ``along_line``.
     """
-    share, sigmas = _fade(image, tube)
+    share, sigmas = _fade(image, tube, *read)
     if curve.status is not FrameStatus.OK or not (share > FADES and sigmas > FADES_SIGMAS):
         return curve
     got = f"a line that fades by {100 * share:.0f} % in its last {FADE_MM:g} mm"
@@ -177,16 +181,15 @@ def first_gap_mm(grey: Array, arc: Array, noise: float) -> tuple[float, float]:
     return np.inf, np.inf
 
 
-def of_one_line(image: Subtraction, tube: Tube, curve: Curve) -> Curve:
+def of_one_line(image: Subtraction, curve: Curve, read: tuple[Array, Array]) -> Curve:
     """The curve with how much of it lies beyond a gap, ambiguous where that is longer than a wire's tip, or a mark.
 
     A second device that faces the wire's tip looks like the wire beyond a gap, and so does the marker at the end of a
     catheter that reaches beyond the wire. Frames at other depths tell: a gap of the wire's own goes with the tip, one
-    that a streak makes stays where it is.
+    that a streak makes stays where it is. read : of ``along_line``.
     """
-    line = dense(tube, 0.5 * image.voxel)
-    arc = arc_length(line)
-    begins_mm, ends_mm = first_gap_mm(image.along(line), arc, image.noise_in(CREST_VOXELS))
+    arc, grey = read
+    begins_mm, ends_mm = first_gap_mm(grey, arc, image.noise_in(CREST_VOXELS))
     beyond_mm = float(arc[-1]) - ends_mm
     if np.isinf(ends_mm) or curve.status is not FrameStatus.OK:
         return curve

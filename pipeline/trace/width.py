@@ -16,8 +16,6 @@ WIDE, WIDE_IN_MODEL = (1.2, 3.5), (1.22, 7.0)
 """How much wider than the body no wire's end is, and by how many standard deviations, where the background was measured
 and where it is modelled. Of 250 right traces none was beyond 1.15 and 3 in the one, and 1.26 and 5.2 in the other;
 J tips of 1.2 to 2 voxels radius had 1.17. A bead, a bubble or a jet of contrast medium at the tip has 1.22 to 1.8."""
-
-
 FOLDED_VOXELS = 5.0
 """Length of the end whose roundness is looked at: as long as two strands beside each other are seen as one line."""
 OUT_OF_ROUND, USUAL, WINDOWS = (0.05, 2.5), 0.75, 6
@@ -39,16 +37,16 @@ def oblong_end(image: Subtraction, points: Array, read: tuple[Array, Array], fit
     read : of ``read_around``.     fitted : of ``as_fitted``.
     """
     arc = arc_length(points)
-    count = int(np.sum(arc[-1] - arc < FOLDED_VOXELS * image.voxel))
-    body = np.flatnonzero(arc[-1] - arc > 2.0 * FOLDED_VOXELS * image.voxel)
-    if len(body) < WINDOWS * count:
+    from_end = (arc[-1] - arc) / image.voxel
+    count, body = np.sum(from_end < FOLDED_VOXELS), np.sum(from_end > 2.0 * FOLDED_VOXELS)
+    if body < WINDOWS * count:
         return 0.0
     window = np.ones(count) / count
     turns = second_harmonic(read[0]) - second_harmonic(fitted[0])
     axis = np.convolve(read[1], window, "valid")  # an end that is dim has as much noise as all of it
     share = np.abs(np.convolve(turns, window, "valid")) / np.maximum(axis, max(float(np.median(axis)), 1e-9))
     least, times = OUT_OF_ROUND
-    usual = float(np.quantile(share[: len(body) - count + 1], USUAL))
+    usual = float(np.quantile(share[: body - count + 1], USUAL))
     return float(share[-1]) / usual if share[-1] > max(least, times * usual) else 0.0
 
 

@@ -11,7 +11,7 @@ from matplotlib.colors import to_hex, to_rgb
 from reports.colours import SIMULATED
 from reports.figures._drawing import Drawing, legend, new_figure, plain, positive_axis
 from reports.figures._style import PALETTE
-from reports.verdict import COPIED, OURS, TIPS_OFF
+from reports.verdict import NEVER_NEAREST, OURS
 
 _FAINT = 0.3  # of a lead that is not clear
 _SHADES = ((0.0, 1.0), (0.0, 0.5), (0.5, 0.5))  # white that is added, share of the colour that is kept
@@ -27,7 +27,7 @@ class SimulatorFiles:
 
 def leads(where: pd.DataFrame) -> pd.DataFrame:
     """Of where.csv the rows of who is nearest."""
-    return where[where["lead"].notna() & ~where["lead"].isin([TIPS_OFF, COPIED])]
+    return where[where["lead"].notna() & ~where["lead"].isin(NEVER_NEAREST)]
 
 
 def colours(names: "pd.Series[str]") -> dict[str, str]:

@@ -101,7 +101,7 @@ def _past_marks(frame: Frame, frames: Sequence[Frame], voxel_mm: float) -> Frame
         for other in frames
         if other.curve is not None
         and other.curve.length_mm < curve.length_mm - CAME_NEARER_MM
-        and np.any(end.query(other.curve.marks_mm.reshape(-1, 3))[0] < STAYED_VOXELS * voxel_mm)
+        and np.any(end.query(other.curve.marks_mm)[0] < STAYED_VOXELS * voxel_mm)
     }
     if not seen or max(seen) - min(seen) < CAME_NEARER_MM:
         return frame
