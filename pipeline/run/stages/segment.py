@@ -1,14 +1,17 @@
 """segment: the lumen, once per case: the user's own, the stored one, or segmented from the wire-free scan."""
 
+import functools
+from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
-from pipeline.arrays.cores import on_cores
+from pipeline.arrays.cores import on_cores, side_by_side
 from pipeline.arrays.grids import corners_mm, indices_of
 from pipeline.load import Crop
 from pipeline.load.lumens import read_lumen
-from pipeline.model import Array, Lumen
+from pipeline.model import Array, Lumen, Volume
 from pipeline.run.projections import slabs
 from pipeline.run.stages.known import Context, Known
 from pipeline.segment import segment
@@ -17,6 +20,7 @@ from pipeline.segment.levels import failed
 from pipeline.segment.opened import outside_mm
 from pipeline.segment.shown import beside_the_wall
 from pipeline.status import StageError
+from pipeline.trace.warm import warm_up
 from reports.frames_file import ScanCrop
 
 
@@ -39,10 +43,31 @@ def segment_vessel(run: Context, known: Known) -> Known:
     crop = Crop(scan, scan.box, config.load)
     radius_mm = case.wire.radius_mm if with_wire else None
     with on_cores(run.cores):
-        lumen = run.stored("segment", segment, crop, case.lumen_seed_mm, config.segment, radius_mm)
+        segmented = _loading(run, reference=not with_wire) if run.cores > 1 else segment
+        lumen = run.stored("segment", segmented, crop, case.lumen_seed_mm, config.segment, radius_mm)
     log.warnings += lumen.warnings
     log.progress("segment", 1, 1, f"{int(np.count_nonzero(lumen.distance.values < 0))} voxels")
     return replace(known, lumen=lumen)
+
+
+def _loading(run: Context, reference: bool) -> Callable[..., Lumen]:
+    """``segment``, which loads the machine code of the stages to come meanwhile: it follows the vessel on one core.
+
+    Helpers, which are forked later, then need not load it, each for itself. reference : whether there is one.
+    """
+
+    def load(scan: Volume) -> None:
+        if run.goes_to("trace"):
+            warm_up(scan.values.dtype, reference=reference)
+        if run.goes_to("simulate"):
+            run.kernels()
+
+    @functools.wraps(segment)  # the store knows it by its name and sources
+    def both(scan: Volume, *given: Any) -> Lumen:
+        found: Lumen = side_by_side(lambda: segment(scan, *given), lambda: load(scan))[0]
+        return found
+
+    return both
 
 
 FAR_OUTSIDE, FAR_OUTSIDE_MM = 2.0, 1.5
