@@ -183,12 +183,14 @@ def cases(summary: pd.DataFrame, links: Mapping[str, str], worse: Iterable[str] 
 
 
 def grid(table: pd.DataFrame, columns: Sequence[Column], bad: Iterable[Any] | None = None, nothing: str = "") -> Grid:
-    """Headings and rows for a template; columns without any value are left out.
+    """Headings and rows for a template; columns without any value are left out, and ends of intervals, told below what
+    they are of.
 
     bad : for each row, whether it is marked.     nothing : what stands in an empty cell. What else the rows
     name is to be explained in ``about``, (name, meaning).
     """
-    kept = [c for c in columns if table[c.name].notna().any()]
+    told = {end for column in columns for end in _ends(column)}
+    kept = [c for c in columns if c.name not in told and table[c.name].notna().any()]
     marks = [False] * len(table) if bad is None else map(bool, bad)
     rows = [
         {"cells": [_cell(record, column, nothing) for column in kept], "bad": mark}
@@ -211,8 +213,14 @@ def _cell(record: Mapping[Any, Any], column: Column, nothing: str) -> dict[str, 
 
 def _interval(record: Mapping[Any, Any], column: Column) -> str:
     """The 95 % interval of rms_mm, tip_median_mm, ...: what rms_low_mm, tip_low_mm, ... hold; empty without."""
-    low, high = (column.with_word(end).replace("_median_", "_") for end in ("low", "high"))
+    low, high = _ends(column)
     return interval(record.get(low), record.get(high))
+
+
+def _ends(column: Column) -> tuple[str, str]:
+    """The columns that hold the ends of a column's interval, where there are any."""
+    low, high = (column.with_word(end).replace("_median_", "_") for end in ("low", "high"))
+    return low, high
 
 
 def _text(value: Any) -> str:

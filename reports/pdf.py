@@ -105,7 +105,7 @@ def _failures(page: Page, failures: pd.DataFrame, out_dir: Path) -> None:
     if rest := sum(row["count"] for row in rows[_MOST_FAILURES:]):
         page.text(f"… and {rest} more in failures.csv")
     command = next_command(failures["case"], typed(out_dir))
-    page.text(f"Next: do what the message says, then {command}", width=WIDE * 9 // 10, weight="bold")
+    page.text(f"Next: see to what the messages name, then {command}", width=WIDE * 9 // 10, weight="bold")
 
 
 def _over_all(out_dir: Path, run: Mapping[str, Any], drawn: Sequence[Figured], worst: CaseFiles) -> Page:

@@ -64,7 +64,7 @@ def main(args: argparse.Namespace) -> int:
         totals, page = launch(plan)
         # of wires that were handed in there is no time of a simulation
         done[name] = (totals if name == OURS else replace(totals, solver_s=0.0)), page
-        for line in failure_lines(plan, "do what the message says, then the same command again"):
+        for line in failure_lines(plan, "see to what the messages name, then the same command again"):
             sys.stderr.write(f"{name}: {line}\n")
         say(f"{name}: {last_line(*done[name])}")
         for text in remarks(done[name][0].pooled, name):

@@ -61,9 +61,9 @@ def _next(plan: Plan, cases: Sequence[str]) -> str:
     """What to do about failures; where the manifest was inferred, it must first be written to be corrected."""
     again = next_command(cases, command_line())
     if plan.inferred_from is None:
-        return f"do what the message says, then {again}"
+        return f"see to what the messages name, then {again}"
     folder = shlex.quote(str(plan.inferred_from))
-    return f"wireval init {folder}, correct in it what is assumed and what the message says, then {again}"
+    return f"wireval init {folder}, correct in it what is assumed and what the messages name, then {again}"
 
 
 def last_line(totals: Totals, index: Path) -> str:

@@ -47,7 +47,7 @@ def _by_source(axes: Axes, table: pd.DataFrame) -> None:
     """A bar for each row, and a thin one for the wire's end."""
     places = np.arange(len(table))
     colours = [{"u_val": UNCERTAINTY, "error": SIMULATED}.get(name, GREY) for name in table["source"]]
-    axes.barh(places - 0.15, table["u_mm"], 0.45, color=colours)
+    axes.barh(places - 0.15, table["u_mm"], 0.45, color=colours, label="whole wire")
     axes.barh(places + 0.25, table["distal_u_mm"], 0.2, color=PURPLE, label="last 10 mm")
     names = [name.replace("_", " ") for name in table["source"]]
     axes.set_yticks(places, ["error" if n == "error" else "all: u val" if n == "u val" else n for n in names])

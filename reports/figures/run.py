@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from reports.case_files import GOOD
 from reports.colours import BAD, SIMULATED
 from reports.figures._drawing import Drawing, error_scale, heat_map, legend, new_figure, plain, whole_numbers
-from reports.figures._style import Look, predictors
+from reports.figures._style import GREY, Look, predictors
 from reports.tables import has
 
 _MAX_INCH = 24.0
@@ -57,7 +57,7 @@ def case_frame_map(run: RunFiles) -> Drawing | None:
 
 
 def cases_by_error(run: RunFiles) -> Drawing | None:
-    """Pooled rms of every case with its 95 % interval, beside the centreline's."""
+    """Pooled rms of every case with its 95 % interval, beside the centreline's and its strongest predictor's."""
     table = run.summary[run.summary["rms_mm"].notna()]
     if len(table) < 2:
         return None
@@ -71,11 +71,15 @@ def cases_by_error(run: RunFiles) -> Drawing | None:
         if chosen.any():
             axes.plot(table["rms_mm"][chosen], places[chosen], shape, color=SIMULATED, label=name)
     axes.plot(table[column], places, marker, color=colour, fillstyle="none", label=label)
+    strongest = [float(row.get(f"null_{row['strongest_null']}_rms_mm", np.nan)) for row in table.to_dict("records")]
+    if np.isfinite(strongest).any():
+        axes.plot(strongest, places, "v", color=GREY, fillstyle="none", label="its strongest predictor")
     axes.set_xlim(left=0.0)
     axes.set_xlabel("pooled rms distance to the traced wire, mm")
     legend(figure, *axes.get_legend_handles_labels(), ncols=3, loc="outside upper left")
     plain(axes)
-    return Drawing(figure, table[["case", "role", "rms_mm", "rms_low_mm", "rms_high_mm", column]])
+    shown = table[["case", "role", "rms_mm", "rms_low_mm", "rms_high_mm", column, "strongest_null"]]
+    return Drawing(figure, shown.assign(strongest_rms_mm=strongest))
 
 
 def _tall(names: Sequence[str]) -> tuple[Figure, Axes]:

@@ -72,8 +72,11 @@ def unbroken(rows: pd.DataFrame) -> tuple[list[float], list[float]]:
 
 
 def _nearest(axes: Axes, rows: pd.DataFrame, shown: dict[str, str]) -> None:
-    """A strip with the colour of the nearest in each bin; white where several are as near."""
-    for row in leads(rows).query("lead != 'tie'").to_dict("records"):
+    """A strip with the colour of the nearest in each bin; white where several are as near, words where none may be."""
+    found = leads(rows)
+    if found.empty:
+        axes.text(0.5, 0.5, "fewer than two may be the nearest", transform=axes.transAxes, ha="center", va="center")
+    for row in found.query("lead != 'tie'").to_dict("records"):
         alpha = 1.0 if row["lead"] == "clear" else _FAINT
         span = row["low_mm"], row["high_mm"]
         axes.axvspan(*span, color=shown[row["simulator"]], alpha=alpha, linewidth=0)

@@ -657,7 +657,7 @@ def test_an_unexpected_error_costs_one_case(
     monkeypatch.setattr("sys.argv", ["/bin/wireval", "run", "study", "-o", "out"])
     assert run(both, tmp_path / "out", *UNTIL) == 1
     said = capsys.readouterr().err.splitlines()
-    assert said[-1] == "next: do what the message says, then wireval run study -o out --only second --resume"
+    assert said[-1] == "next: see to what the messages name, then wireval run study -o out --only second --resume"
     assert said[-1].partition("then ")[2] in (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
     failures = pd.read_csv(tmp_path / "out" / "failures.csv")
     assert "burst pipe" in failures["message"][0]

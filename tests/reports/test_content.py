@@ -11,6 +11,7 @@ import pytest
 from reports import _content
 from reports.case_files import counted
 from reports.counts import scans
+from reports.schema import SWEEP
 
 
 @pytest.mark.parametrize(
@@ -123,3 +124,12 @@ def test_one_insertion_is_no_plural() -> None:
 def test_one_thing_is_no_plural() -> None:
     """``1 cases compared``, ``1 frames: 1 ok``."""
     assert [counted(n, "frame") for n in (0, 1, 2)] == ["0 frames", "1 frame", "2 frames"]
+
+
+def test_the_ends_of_an_interval_stand_below_what_they_are_of() -> None:
+    """A sweep's table had those of a skill below it and in two columns of their own."""
+    row = {"parameter": "p", "case": "(all)", "skill_strongest": 0.9, "skill_strongest_low": 0.8}
+    table = pd.DataFrame([row | {"skill_strongest_high": 0.95}]).reindex(columns=SWEEP.names)
+    found = _content.grid(table, SWEEP.columns)
+    assert [head["name"] for head in found["columns"]] == ["parameter", "case", "skill_strongest"]
+    assert found["rows"][0]["cells"][-1]["detail"] == "0.800 to 0.950"

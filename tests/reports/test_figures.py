@@ -21,12 +21,12 @@ from reports.figures import RunFiles, _drawing, _planes, declared, figures_of
 from reports.figures._drawing import LEAST_MM, Drawing, FrameAxis, positive_axis
 from reports.figures._style import STAGE_COLOURS, lines, predictors
 from reports.figures.along_wire import _CLIP_PERCENTILE
+from reports.figures.simulators import _nearest, unbroken
 from reports.figures.simulators import colours as colours_of
-from reports.figures.simulators import unbroken
 from reports.frames_file import FrameArrays, ScanCrop, frame_numbers, read_frame, read_scan, write_frames
 from reports.page import draw_sections
 from reports.schema import BUDGET, ENTRIES, ERRORS, POINTS, SUMMARY, SWEEP, TIMINGS
-from reports.verdict import OURS
+from reports.verdict import NEVER_NEAREST, OURS
 from tests.reports.fake_results import FakeCase, write_run
 
 CASE_FIGURES = figures_of("case")
@@ -287,6 +287,27 @@ def test_a_band_is_two_sigma_to_both_sides_however_the_scan_is_turned() -> None:
         np.testing.assert_allclose(width, 4 * 0.2, rtol=1e-9)
 
 
+def test_a_case_stands_beside_the_predictor_that_came_nearest() -> None:
+    """The centreline alone was there: 1.3 mm beside another predictor's 0.3."""
+    row = {"role": "validation", "rms_mm": 0.2, "null_centreline_rms_mm": 1.3, "null_previous_rms_mm": 0.3}
+    cases = [{"case": "a", **row, "strongest_null": "previous"}, {"case": "b", **row}]
+    summary = pd.DataFrame(cases).reindex(columns=SUMMARY.names)
+    drawing = RUN_FIGURES["cases_by_error"](RunFiles({}, summary, tables.read_if_there(None, SWEEP)))
+    assert drawing is not None
+    np.testing.assert_array_equal(drawing.table["strongest_rms_mm"], [0.3, np.nan])
+    (marks,) = [line for line in drawing.figure.axes[0].lines if line.get_label() == "its strongest predictor"]
+    np.testing.assert_array_equal(marks.get_xdata(), [0.3, np.nan])
+
+
+def test_a_strip_without_a_nearest_says_so() -> None:
+    where = pd.DataFrame({"along": "depth", "simulator": list("ab"), "low_mm": 0.0, "high_mm": 5.0, "rms_mm": 0.1})
+    for lead, words in ((NEVER_NEAREST[0], 1), ("clear", 0)):
+        axes = Figure().subplots()
+        _nearest(axes, where.assign(lead=[lead, None]), {"a": "red", "b": "blue"})
+        assert len(axes.texts) == words
+        assert len(axes.patches) == 1 - words
+
+
 def test_u_val_has_one_colour(tmp_path: Path) -> None:
     """Its bar had the traced wire's, its line over the depth another."""
     tables.write(tmp_path / "budget.csv", BUDGET, [{"source": "u_val", "u_mm": 0.2, "distal_u_mm": 0.3}])
@@ -304,6 +325,7 @@ def test_a_budget_is_drawn_by_source_and_by_entry(tmp_path: Path) -> None:
     assert drawing is not None
     (left,) = drawing.figure.axes
     assert [bar.get_width() for bar in left.patches] == [0.1, 0.2, 0.2, 0.4]
+    assert [text.get_text() for text in left.get_legend().get_texts()] == ["whole wire", "last 10 mm"]
     entry = {"clamp": "estimated", "depth": "traced", "frames": 3, "rms_mm": 0.1, "distal10_rms_mm": 0.2}
     tables.write(tmp_path / "entries.csv", ENTRIES, [entry | {"tip_median_mm": 0.3}])
     both = CASE_FIGURES["budget"](case)
