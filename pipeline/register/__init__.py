@@ -71,7 +71,8 @@ class Registration:
     moved_voxels : largest displacement of a wall point.  left_voxels : what a fit of the wall alone still asks for.
     misfit_voxels : residual of that fit, as the uncertainty of one point.  centre_shift_mm : (3,) of the
     wall's centroid; the motion's own shift is that of the world's origin, which may be far away.  loose_mm : how far
-    along (or about) itself the vessel may have moved besides, and the frame shows it as well.
+    along (or about) itself the vessel may have moved besides, and the frame shows it as well.  noise_voxels : what
+    noise alone makes of the misfit.
     """
 
     motion: Motion = field(default_factory=Motion)
@@ -81,6 +82,7 @@ class Registration:
     misfit_voxels: float = 0.0
     centre_shift_mm: Array = field(default_factory=lambda: np.zeros(3))
     loose_mm: float = 0.0
+    noise_voxels: float = 0.0
     bent: Bent = field(default_factory=Bent)
 
     @property
@@ -91,6 +93,12 @@ class Registration:
     @property
     def sentence(self) -> str:
         """What was done, for the report."""
+        if not self.trusted and self.misfit_voxels < np.hypot(BAD_MISFIT_VOXELS, self.noise_voxels):
+            return (
+                "no registration applied: noise hides where the walls lie (they miss the reference's by "
+                f"{self.misfit_voxels:.1f} voxels, {self.noise_voxels:.1f} by noise alone; {BAD_MISFIT_VOXELS} are "
+                "allowed): the phantom is taken not to have moved; scan with less noise, or set trace.register = off"
+            )
         if not self.trusted:
             return (
                 f"no registration applied: the walls fit the reference in no place (misfit {self.misfit_voxels:.1f} "
@@ -165,7 +173,8 @@ def register(frame: Volume, to: Anchor, skip_voxels: float) -> Registration:
     last, _ = look(frame, wall, motion)
     left = farthest(last.motion.after(motion), wall)
     if last.misfit_voxels > BAD_MISFIT_VOXELS:
-        return Registration(moved_voxels=moved, left_voxels=left, misfit_voxels=last.misfit_voxels)
+        noise = wall.noise_voxels
+        return Registration(moved_voxels=moved, left_voxels=left, misfit_voxels=last.misfit_voxels, noise_voxels=noise)
     if (far := farthest(motion, wall)) < skip_voxels:
         return _still(wall, look(frame, wall, Motion())[0], far)
     shift, loose_mm, rest = motion.displacement_mm(wall.centre_mm), loose * wall.voxel_mm, bent(wall, last.last)

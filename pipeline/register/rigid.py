@@ -111,6 +111,7 @@ def rigid(frame: Volume, reference: Volume, edges: NDArray[np.bool_], centre_mm:
     """The motion of the phantom from the reference to the frame, from rest, by correlation at walls and bones.
 
     Both scans on one lattice; edges : the reference's (:func:`edge_mask`). Deterministic: regular samples, one thread.
+    At rest where too little is seen of the edges for a metric.
     """
     fixed, moving = (_image(np.asarray(v.values, np.float32), v) for v in (reference, frame))
     method = sitk.ImageRegistrationMethod()
@@ -131,5 +132,8 @@ def rigid(frame: Volume, reference: Volume, edges: NDArray[np.bool_], centre_mm:
     start = sitk.Euler3DTransform()
     start.SetCenter(centre_mm.tolist())
     method.SetInitialTransform(start, inPlace=True)
-    method.Execute(fixed, moving)
+    try:
+        method.Execute(fixed, moving)
+    except RuntimeError:  # no sample lies on an edge: noise hides them, or metal covers them
+        return Motion()
     return Motion(np.reshape(start.GetMatrix(), (3, 3)), np.array(start.TransformPoint((0.0, 0.0, 0.0))))

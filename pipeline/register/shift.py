@@ -105,6 +105,15 @@ class StaticPoints:
         """Root mean square gradient, per mm."""
         return float(np.sqrt(np.mean(np.sum(self.gradient**2, axis=1))))
 
+    @property
+    def noise_voxels(self) -> float:
+        """The misfit of a frame as noisy as the reference, by noise alone.
+
+        White noise leaves sqrt(2) times as much in blurred grey as in its gradient times the blur, and of two scans
+        sqrt(2) times that. Correlated over 0.7 voxel it was within 5 %.
+        """
+        return 2.0 * self.noise * self.blur_mm / max(self.voxel_mm * self.steepness, 1e-9)
+
 
 class Solved(NamedTuple):
     """Amounts (6,) of motion (see ``changes``) and the change of grey (n,) by them; each patch's gain (k,); what is

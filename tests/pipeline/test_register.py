@@ -16,7 +16,7 @@ from pipeline.model import Lumen, Volume
 from pipeline.register import Anchor, Motion, Registration, anchor, register
 from pipeline.register.frames import alignment_of, record, sentences_of
 from pipeline.register.rigid import rigid
-from pipeline.register.shift import fit_motion
+from pipeline.register.shift import fit_motion, look
 from pipeline.segment import segment
 from solver import Grid
 
@@ -116,6 +116,34 @@ def test_another_phantom_is_not_forced_into_place(study: Study, fixed: Anchor) -
     assert not found.applied
     assert not found.trusted
     assert "the walls fit the reference in no place" in found.sentence
+
+
+@pytest.mark.parametrize("sd", [200.0, 400.0])
+def test_what_noise_makes_of_a_misfit_is_known(study: Study, lumen: Lumen, sd: float) -> None:
+    """The scanner's own noise, correlated over half a voxel, is 100."""
+    reference, frame = (_noisier(study, sd, seed) for seed in (1, 2))
+    wall = anchor(reference, lumen).wall
+    assert look(frame, wall, Motion())[0].misfit_voxels == pytest.approx(wall.noise_voxels, rel=0.1)
+
+
+def test_walls_that_noise_hides_are_not_said_to_be_elsewhere(study: Study, lumen: Lumen) -> None:
+    """A phantom that had not moved was told that its walls fit the reference in no place."""
+    found = register(_noisier(study, 1000.0, 2), anchor(_noisier(study, 1000.0, 1), lumen), SKIP)
+    assert not found.applied
+    assert not found.trusted
+    assert "noise hides where the walls lie" in found.sentence
+
+
+def test_a_scan_of_noise_alone_is_no_error(study: Study, lumen: Lumen) -> None:
+    """SimpleITK raised RuntimeError where no voxel is steep enough for an edge."""
+    noise = _noisier(study, 2000.0, 2)
+    assert not rigid(noise, noise, np.zeros(noise.shape, bool), np.zeros(3)).angle_deg
+    assert not register(noise, anchor(_noisier(study, 600.0, 1), lumen), SKIP).applied
+
+
+def _noisier(study: Study, sd: float, seed: int) -> Volume:
+    noise = np.random.default_rng(seed).normal(0.0, sd, study.grid.shape)
+    return volume(study, np.rint(np.asarray(study.reference, float) + noise).clip(-32768, 32767).astype(np.int16))
 
 
 def test_motions_compose_and_undo() -> None:
