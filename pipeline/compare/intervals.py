@@ -118,17 +118,26 @@ def effective_frames(values: Sequence[Array]) -> float:
     """Number of independent frames that would tell as much. values : (n,) of each insertion's frames, in their order.
 
     The model: successive frames have one correlation (pooled, corrected for its bias of -(1 + 3 r) / n), and insertions
-    have a variance of their own. At least 1; NaN where it cannot be known: no insertion of four frames.
+    have a variance of their own. At least 1 for each insertion; NaN where it cannot be known: none has four frames.
     """
     own = [np.asarray(v, dtype=float) - np.mean(v) for v in values if len(v) > 3]
     if not own or not sum(float(v @ v) for v in own):
         return float("nan")
-    frames, length = sum(map(len, values)), float(np.mean([len(v) for v in own]))
-    within = sum(float(v @ v) for v in own) / sum(len(v) - 1 for v in own)
+    frames, length = np.array([*map(len, values)]), float(np.mean([len(v) for v in own]))
     lag = sum(float(v[1:] @ v[:-1]) for v in own) / sum(float(v @ v) for v in own)
     r = float(np.clip((lag + 1 / length) / max(1 - 3 / length, 0.25), 0.0, 0.95))
-    slower = (1 + r) / (1 - r)
+    # variance of an insertion's mean, over that of its frames; these vary about it by what is left
+    mean = np.array([_slower(int(n), r) / n for n in frames])
+    left = sum(float(v @ v) for v in own) / sum(len(v) * max(1 - _slower(len(v), r) / len(v), 0.2) for v in own)
     means = np.array([np.mean(v) for v in values])
-    between = max(float(means.var(ddof=1)) - within * slower * len(means) / frames, 0.0) if len(means) > 1 else 0.0
-    told = (within + between) / (between / len(means) + within * slower / frames)
-    return float(np.clip(told, 1.0, frames))
+    between = max(float(means.var(ddof=1)) - left * float(mean.mean()), 0.0) if len(means) > 1 else 0.0
+    shares = (frames / frames.sum()) ** 2
+    told = (left + between) / float(shares @ (between + left * mean))
+    return float(np.clip(told, 1.0, frames.sum()))
+
+
+def _slower(count: int, r: float) -> float:
+    """Variance of the mean of ``count`` values of an autoregressive series of lag-1 correlation ``r``, over that of as
+    many independent ones: (1 + r) / (1 - r) of very many, and at most ``count``."""
+    k = np.arange(1, count)
+    return float(1.0 + 2.0 * np.sum((1.0 - k / count) * r**k))

@@ -178,4 +178,4 @@ def register(frame: Volume, to: Anchor, skip_voxels: float) -> Registration:
     if (far := farthest(motion, wall)) < skip_voxels:
         return _still(wall, look(frame, wall, Motion())[0], far)
     shift, loose_mm, rest = motion.displacement_mm(wall.centre_mm), loose * wall.voxel_mm, bent(wall, last.last)
-    return Registration(motion, True, far, left, last.misfit_voxels, shift, loose_mm, rest)
+    return Registration(motion, True, far, left, last.misfit_voxels, shift, loose_mm, bent=rest)

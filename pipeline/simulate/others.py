@@ -49,10 +49,13 @@ def begun(points_mm: Array, entry_mm: Array, direction: Array) -> Array:
     return np.concatenate([places[nearest][None], rest[np.linalg.norm(rest - places[nearest], axis=1) > 0]])
 
 
-def oddity(points_mm: Array, entry_mm: Array, direction: Array, unit: str = "mm") -> str:
+def oddity(
+    points_mm: Array, entry_mm: Array, direction: Array, unit: str = "mm", depth_mm: float = float("nan")
+) -> str:
     """Why a wire cannot have been pushed in at this entry, and what would make it fit; empty where it can.
 
-    unit : in which its numbers were stated to be, before they became mm.
+    unit : in which its numbers were stated to be, before they became mm.     depth_mm : how deep it should be, where
+    that is known: no unit explains a wire that it makes more than three times as long, or as short.
     """
     back = _turned_back(points_mm)
     if back:
@@ -60,7 +63,7 @@ def oddity(points_mm: Array, entry_mm: Array, direction: Array, unit: str = "mm"
     wrong = _misplaced(points_mm, entry_mm, direction)
     if not wrong:
         return ""
-    readings = _readings(points_mm, unit)
+    readings = _readings(points_mm, unit, depth_mm)
     # one that only just passes, too, explains nothing
     near = 0.5 * AT_ENTRY_MM
     found = next((name for name, other in readings if not _misplaced(other, entry_mm, direction, near)), "")
@@ -90,18 +93,25 @@ def _misplaced(points_mm: Array, entry_mm: Array, direction: Array, near_mm: flo
     return ""
 
 
-def _readings(points_mm: Array, unit: str) -> Iterator[tuple[str, Array]]:
+def _readings(points_mm: Array, unit: str, depth_mm: float) -> Iterator[tuple[str, Array]]:
     """Other readings of the numbers (point order, axes, units), each with its points; fewest changes first."""
+    length_mm = float(arc_length(points_mm)[-1])
     orders = {"": points_mm, "read from its other end (tip first)": points_mm[::-1]}
     spaces = {"": np.eye(3), "RAS": np.diag(MIRROR)}
     written = {"": np.eye(3)} | {f"written as {name}": np.eye(3)[list(axes)] for name, axes in AXES.items()}
     stated = f", not in {unit}" * (unit != "mm")
     units = {"": 1.0} | {f"in {name}{stated}": factor for name, factor in other_units(unit).items()}
+    units = {name: factor for name, factor in units.items() if not name or not _far_from(depth_mm, factor * length_mm)}
     ways = product(orders.items(), spaces.items(), written.items(), units.items())
     all_of_them = [tuple(zip(*named, strict=True)) for named in ways]
     for names, (points, signs, axes, factor) in sorted(all_of_them, key=lambda one: sum(map(bool, one[0]))):
         if any(names):
             yield " and ".join(filter(None, names)), points @ axes @ signs * factor
+
+
+def _far_from(depth_mm: float, length_mm: float) -> bool:
+    """Whether a wire of this length is none of this depth; never where the depth is not known."""
+    return bool(max(length_mm, 1e-9) > 3.0 * depth_mm or 3.0 * length_mm < depth_mm)
 
 
 def not_to_depth(length_mm: float, depth_mm: float, tolerance_mm: float, stated: str = "mm") -> str:

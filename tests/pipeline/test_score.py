@@ -215,6 +215,20 @@ def test_a_reading_that_only_just_passes_is_none() -> None:
     assert oddity(wire, entry, up).endswith("check its coordinates")
 
 
+def test_a_unit_explains_no_wire_that_it_makes_too_long() -> None:
+    """A wire of 24 mm that begins 6 mm beyond its entry "would if it were in cm", 300 mm deep."""
+    entry, up = np.array([0.3, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
+    wire = entry + np.array([0.1, 0.0, 0.55]) + 0.1 * np.arange(24.0)[:, None] * up
+    assert oddity(10.0 * (wire - entry) + entry, entry, up, depth_mm=30.0).endswith("check its coordinates")
+    tenth = 0.1 * (entry + np.arange(30.0)[:, None] * up) + [8.0, 0.0, 0.0]
+    assert oddity(tenth, entry, up, depth_mm=30.0).endswith("check its coordinates"), "in cm it lies 80 mm off"
+    in_cm = 0.1 * (entry + [60.0, 0.0, 0.0] + np.arange(30.0)[:, None] * up)
+    here = entry + [60.0, 0.0, 0.0]
+    assert oddity(in_cm, here, up).endswith("in cm")
+    assert oddity(in_cm, here, up, depth_mm=30.0).endswith("in cm")
+    assert oddity(in_cm, here, up, depth_mm=3.0).endswith("check its coordinates")
+
+
 def test_wires_in_another_order_are_told() -> None:
     """Neighbours that were swapped passed where frames lie nearer together than the tolerance of depths."""
     depths = np.array([10.0, 11.5, 13.0, 14.5])

@@ -150,6 +150,7 @@ def test_who_failed_frames_stands_below_who_did_not(tmp_path: Path) -> None:
     text = render_simulators(tmp_path).read_text(encoding="utf-8")
     table = text[text.index('id="simulators"') :]
     assert table.index(">wireval<") < table.index(">easy<")
+    assert "the pages of easy</a>" in text, "OUT is the first one's, whoever is the best"
 
 
 def test_who_is_nearest_where(compared: Path) -> None:

@@ -69,7 +69,8 @@ def _taken(run: Context, known: Known, frame: Frame, file: OtherFile) -> Frame:
     if file.points_mm is None:
         status = FrameStatus.CURVE_MISSING if file.missing else FrameStatus.CURVE_UNUSABLE
         return frame.failed("simulate", status, f"{file.name}: {file.problem}")
-    odd = oddity(file.points_mm, np.array(case.entry_mm), np.array(case.entry_direction), file.unit)
+    entry, direction = np.array(case.entry_mm), np.array(case.entry_direction)
+    odd = oddity(file.points_mm, entry, direction, file.unit, frame.depth_mm)
     if odd:
         return frame.failed("simulate", FrameStatus.CURVE_UNUSABLE, f"{file.name}: {odd}")
     points = begun(file.points_mm, clamp.entry_mm, clamp.direction)

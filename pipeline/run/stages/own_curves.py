@@ -47,7 +47,7 @@ def as_given(run: Context, frame: Frame, curve: Curve, distance: Grid) -> Frame:
     distance : the lumen's, mm.
     """
     entry, direction = np.array(run.case.entry_mm), np.array(run.case.entry_direction)
-    odd = oddity(curve.points_mm, entry, direction)
+    odd = oddity(curve.points_mm, entry, direction, depth_mm=frame.expected_mm)
     if odd:
         return frame.failed("trace", FrameStatus.TRACE_FAILED, f"{curve.note}: {odd}")
     points = begun(curve.points_mm, entry, direction)
