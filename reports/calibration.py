@@ -1,8 +1,10 @@
 """The pages of a calibration and of a planned one: parameters with what is seen of them, profiles, errors."""
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from reports._content import NOTHING, flatten, grid, number
@@ -15,10 +17,15 @@ PRIOR = (
     "of its logarithm"
 )
 USED = "what parameters.toml holds: of a parameter that is not seen what is stated; the others fitted again beside it"
+FACTOR_FROM = 0.3
+"""Standard deviation of a logarithm from which it is told as a factor."""
+OF_FACTORS = "of a factor in percent, or, where it is large, as what to multiply and to divide the value by"
+NOTHING_GAINED = 0.98
+"""Error after calibrating over the one before from which nothing was gained."""
 COLUMNS = (
     Column("parameter", "-", "a factor on what the manifest states, or in the unit that its name ends with", "text"),
     Column("value", "-", "where the wires meet the traces best", "text"),
-    Column("sd", "-", "one standard deviation: how far the true value may be off; of a factor in percent", "text"),
+    Column("sd", "-", "one standard deviation: how far the true value may be off; " + OF_FACTORS, "text"),
     Column("used", "-", USED, "text"),
     Column("seen", "-", "known well enough to be taken", "text"),
     Column("prior", "-", PRIOR, "text"),
@@ -28,7 +35,7 @@ COLUMNS = (
 
 PLANNED = (
     COLUMNS[0],
-    Column("sd", "-", "one standard deviation as the planned study would find it; of a factor in percent", "text"),
+    Column("sd", "-", "one standard deviation as the planned study would find it; " + OF_FACTORS, "text"),
     Column("enough", "-", "a standard deviation up to which the parameter counts as seen", "text"),
     COLUMNS[4],
     COLUMNS[-1],
@@ -46,6 +53,7 @@ def render_calibration(out: Path, embed: bool = False) -> Path:
         "used": record["used"],
         "unseen": unseen,
         "scale": number(record["scale"]),
+        "gained": gained(record["frames"]),
         "starts": [(number(roll), number(value)) for roll, value in record["starts"]],
         "estimates": grid(table, COLUMNS, bad=[not row["seen"] for row in rows], nothing=NOTHING),
         "sections": draw_sections("calibration", record, out, embed),
@@ -72,21 +80,40 @@ def render_design(out: Path) -> Path:
 
 
 def _planned(row: dict[str, Any]) -> dict[str, Any]:
-    spread, enough = (
-        f"{number(100 * row[key], 2)} %" if row["logarithmic"] else number(float(row[key]), 2)
-        for key in ("sd", "enough")
-    )
+    spread, enough = (_spread(row, key) for key in ("sd", "enough"))
     seen = "yes" if row["seen"] else "NO"
     return {"parameter": row["name"], "sd": spread, "enough": enough, "seen": seen, "meaning": row["what"]}
 
 
+def _spread(row: dict[str, Any], key: str) -> str:
+    """A standard deviation; that of a factor in percent, or, where these would reach below zero, as a factor itself."""
+    sd = float(row[key])
+    if row["logarithmic"]:
+        return f"a factor of {number(float(np.exp(sd)), 2)}" if sd > FACTOR_FROM else f"{number(100 * sd, 2)} %"
+    return number(sd, 2)
+
+
+def gained(frames: Sequence[Mapping[str, Any]]) -> str:
+    """How far the wires of the fitted frames lie from their traces, as stated and as calibrated; empty without any."""
+    known = pd.DataFrame(frames, columns=["depth_mm", "before_mm", "after_mm"]).astype(float).dropna()
+    if known.empty:
+        return ""
+    before, after = (
+        float(np.sqrt(np.average(known[name] ** 2, weights=known["depth_mm"]))) for name in ("before_mm", "after_mm")
+    )
+    nothing = ": calibrating has gained nothing there" * (after > NOTHING_GAINED * before)
+    return (
+        f"the wires of the {len(known)} fitted frames lie {number(before)} mm rms from their traces as stated, "
+        f"{number(after)} mm as calibrated{nothing}"
+    )
+
+
 def _row(row: dict[str, Any]) -> dict[str, Any]:
-    spread = f"{number(100 * row['sd'], 2)} %" if row["logarithmic"] else number(row["sd"], 2)
     bounds = " to ".join(number(float(v)) for v in row["bounds"])
     return {
         "parameter": row["name"],
         "value": number(float(row["value"])),
-        "sd": spread,
+        "sd": _spread(row, "sd"),
         "used": number(float(row["used"])),
         "seen": "yes" if row["seen"] else "NO",
         "prior": f"{number(float(row['prior']))} ± {number(float(row['prior_sd']), 2)}",

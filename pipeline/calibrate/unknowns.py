@@ -48,7 +48,12 @@ class Unknown:
 
 
 def spread_in_words(sd: float, *, logarithmic: bool) -> str:
-    """A standard deviation without an exponent; of the logarithm of a factor in per cent of it."""
+    """A standard deviation without an exponent; of the logarithm of a factor in per cent of it, or as a factor itself.
+
+    From 30 % on per cent mislead: 143 % of a wall are a factor of 4.2 up or down, and not less than nothing.
+    """
+    if logarithmic and sd > 0.3:
+        return f"a factor of {np.exp(sd):.3g}"
     value = 100.0 * sd if logarithmic else sd
     return (f"{value:.3g}" if value < 1000.0 else f"{value:.0f}") + " %" * logarithmic
 

@@ -33,6 +33,8 @@ ADVICE = {
 def estimates_of(found: Gathered, fit: Calibration) -> list[dict[str, Any]]:
     """Rows of all parameters, the depth offset among them."""
     rows = [_row(e) for e in fit.estimates]
+    off = float(np.mean([_too_flat(voxels) for voxels in _thickness(found).values()] or [0.0]))
+    rows = [row | {"sd": float(np.hypot(row["sd"], off))} if row["name"] == REST else row for row in rows]
     value, sd = depth_offset(found, fit)
     seen = bool(np.isfinite(sd) and sd <= DEPTH_ENOUGH_MM)
     why = "" if seen else "no depths are stated" if np.isnan(sd) else f"known to {sd:.2g} mm only"
@@ -103,22 +105,31 @@ FLATTENING_VOXELS = 0.9
 """Diameter of a wire in voxels below which its curved tip is traced too flat."""
 
 
-def flattened(found: Gathered) -> list[str]:
-    """A warning where a thin wire's curved tip is traced too flat, by more than standard deviations say.
-
-    Measured on bends of three seeds each (docs/howto/calibrate.md): by 9 % with a diameter of 0.48 voxels, 2 % with
-    0.72, less than 1 % with 0.96.
-    """
+def _thickness(found: Gathered) -> dict[str, float]:
+    """The wire's diameter in voxels in every case that was traced here."""
     pairs = zip(found.cases, found.trials, strict=True)
-    coarse = {c.id: 2.0 * t.wire.radius_mm / t.voxel_mm for c, t in pairs if c.frames and not c.traces}
-    thin = {case: voxels for case, voxels in coarse.items() if voxels < FLATTENING_VOXELS}
+    return {c.id: 2.0 * t.wire.radius_mm / t.voxel_mm for c, t in pairs if c.frames and not c.traces}
+
+
+def _too_flat(voxels: float) -> float:
+    """The share by which the curve of a tip so thick is traced too flat.
+
+    Measured on bends of three seeds each (docs/howto/calibrate.md): 9 % with a diameter of 0.48 voxels, 2 % with 0.72,
+    less than 1 % with 0.96.
+    """
+    return 0.02 * (0.72 / voxels) ** 3.7 if voxels < FLATTENING_VOXELS else 0.0
+
+
+def flattened(found: Gathered) -> list[str]:
+    """A warning where a thin wire's curved tip is traced too flat."""
+    thin = {case: voxels for case, voxels in _thickness(found).items() if voxels < FLATTENING_VOXELS}
     if not thin:
         return []
     least = min(thin.values())
     return [
         f"{', '.join(thin)}: the wire's diameter is {least:.2f} voxels, and below {FLATTENING_VOXELS} its tip is "
         "traced too flat: the rest curvature came out 2 % too small at 0.72 voxels and 9 % at 0.48, which its standard "
-        "deviation does not know; scan with smaller voxels"
+        "deviation includes; scan with smaller voxels"
     ]
 
 

@@ -213,6 +213,7 @@ def _written(job: Job, known: Known, log: Log, files: LumenFiles, clock: float) 
     tables.write(job.folder / TIMINGS.file, TIMINGS, outputs.timing_rows(job.case.id, log, **spent))
     results.write_json(job.folder / ledger.PROVENANCE, this_run() | {"reused": log.reused})
     details = results.details_of(job.case, known, log) | ({"simulator": job.simulator} if job.simulator else {})
+    summary |= {"warnings": len(log.warnings)}
     details |= {"until": job.until, "config": job.settings.as_dict(), "provenance": code_state()}
     return results.result_of(job.case, known, summary, key, details)
 

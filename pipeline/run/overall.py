@@ -162,7 +162,7 @@ def frames_of(found: Sequence[Found]) -> list[Scored]:
     return [frame for case in found for frame in case.frames.values()]
 
 
-COUNTED = ("frames", "frames_ok", "frames_failed", "frames_fitted")
+COUNTED = ("frames", "frames_ok", "frames_failed", "frames_fitted", "warnings")
 
 
 def overall(found: Sequence[Found]) -> dict[str, Any]:

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from pipeline.calibrate.design import predicted, straight_to
-from pipeline.calibrate.estimates import _judged, calibrated
+from pipeline.calibrate.estimates import Estimate, _judged, calibrated
 from pipeline.calibrate.fit import Problem
 from pipeline.calibrate.residuals import Evidence, weights_of
 from pipeline.calibrate.search import own_roll
@@ -23,10 +23,11 @@ from pipeline.calibrate.unknowns import BENDING, FRICTION, REST, ROLL, TAPER, be
 from pipeline.cli import main
 from pipeline.compare.pooled import is_pooled
 from pipeline.model import Clamp, Curve, Lumen, Wall, Wire
+from pipeline.run import calibration_files
 from pipeline.run.cache import Store
 from pipeline.run.calibrated import as_calibrated, data_of
 from pipeline.run.calibration import gathered, over_insertions
-from pipeline.run.calibration_files import flattened, misfit
+from pipeline.run.calibration_files import estimates_of, flattened, misfit
 from pipeline.run.inputs import described, other_file, stated
 from pipeline.run.log import Log
 from pipeline.run.outputs import error_row, summary_row
@@ -444,15 +445,28 @@ def test_what_was_assumed_is_no_problem(tmp_path: Path, monkeypatch: pytest.Monk
 def test_a_wire_that_is_thin_in_its_voxels_is_warned_of():
     """In scans alone: own curves were not traced here."""
 
-    def found(voxel_mm, **case):
-        one = SimpleNamespace(**({"id": "a", "frames": ("scan",), "traces": ()} | case))
-        return SimpleNamespace(
-            cases=[one], trials=[SimpleNamespace(wire=SimpleNamespace(radius_mm=0.18), voxel_mm=voxel_mm)]
-        )
+    assert flattened(of_voxels(0.375)) == []
+    assert "a: the wire's diameter is 0.48 voxels" in flattened(of_voxels(0.75))[0]
+    assert flattened(of_voxels(0.75, frames=("scan",), traces=("curve",))) == []
 
-    assert flattened(found(0.375)) == []
-    assert "a: the wire's diameter is 0.48 voxels" in flattened(found(0.75))[0]
-    assert flattened(found(0.75, frames=("scan",), traces=("curve",))) == []
+
+def of_voxels(voxel_mm, **case) -> Any:
+    """What a fit has of one case whose wire has a radius of 0.18 mm."""
+    one = SimpleNamespace(**({"id": "a", "frames": ("scan",), "traces": ()} | case))
+    trials = [SimpleNamespace(wire=SimpleNamespace(radius_mm=0.18), voxel_mm=voxel_mm)]
+    return SimpleNamespace(cases=[one], trials=trials)
+
+
+def test_what_a_thin_wire_is_flattened_by_is_in_the_standard_deviation(monkeypatch):
+    """A rest curvature 10 % off had a standard deviation of 2 %."""
+    monkeypatch.setattr(calibration_files, "depth_offset", lambda *_: (0.0, np.nan))
+    unknown = {u.name: u for u in unknowns([], 0.0, weighed=False)}
+    rows = [Estimate(unknown[name], 0.0, 0.02, 0.0, True, "", ()) for name in (REST, TAPER)]
+    fit: Any = SimpleNamespace(estimates=rows)
+    for voxel_mm, sd in ((0.375, 0.02), (0.75, np.hypot(0.02, 0.09)), (0.5, np.hypot(0.02, 0.02))):
+        rest, taper, _ = estimates_of(of_voxels(voxel_mm), fit)
+        assert rest["sd"] == pytest.approx(sd, rel=0.01)
+        assert taper["sd"] == 0.02
 
 
 def test_a_step_of_three_prior_deviations_costs_nine():
@@ -464,12 +478,13 @@ def test_a_step_of_three_prior_deviations_costs_nine():
     assert problem.value(means + 3.0 * sds * (np.arange(len(means)) == at), []) == pytest.approx(9.0)
 
 
-def test_how_well_a_factor_is_known_is_said_in_per_cent() -> None:
-    """Beside "103 %" in the table the page said that it was known to 1.03."""
+def test_how_well_a_factor_is_known_is_said_in_per_cent_or_as_a_factor() -> None:
+    """Beside "103 %" in the table the page said that it was known to 1.03; and less than nothing is no wall."""
     free = {u.name: u for u in unknowns([], 0.0, weighed=False)}
     fit: Any = SimpleNamespace(values={TAPER: 0.0, FRICTION: 0.0}, sd={TAPER: 1.034, FRICTION: 0.0754})
     said = [_judged(free[name], fit, ()).why for name in (TAPER, FRICTION)]
-    assert said[0] == "known to 103 % only; 20 % or less counts as seen"
+    assert said[0] == "known to a factor of 2.81 only; 20 % or less counts as seen"
     assert said[1] == "known to 0.0754 only; 0.02 or less counts as seen"
-    assert spread_in_words(0.9951, logarithmic=True) == "99.5 %"  # it was 1e+02 %
-    assert spread_in_words(12.34, logarithmic=True) == "1234 %"
+    assert spread_in_words(0.2951, logarithmic=True) == "29.5 %"
+    assert spread_in_words(1.4, logarithmic=True) == "a factor of 4.06"
+    assert spread_in_words(1234.5, logarithmic=False) == "1234"  # it was 1e+03

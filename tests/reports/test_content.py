@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 
 from reports import _content
+from reports.calibration import gained
 from reports.case_files import counted
 from reports.counts import scans
 from reports.schema import SWEEP
@@ -133,3 +134,12 @@ def test_the_ends_of_an_interval_stand_below_what_they_are_of() -> None:
     found = _content.grid(table, SWEEP.columns)
     assert [head["name"] for head in found["columns"]] == ["parameter", "case", "skill_strongest"]
     assert found["rows"][0]["cells"][-1]["detail"] == "0.800 to 0.950"
+
+
+def test_a_calibration_that_gains_nothing_says_so() -> None:
+    frames = [{"depth_mm": mm, "before_mm": rms, "after_mm": rms} for mm, rms in ((10.0, 0.05), (30.0, 0.1))]
+    said = gained(frames)
+    assert said.startswith("the wires of the 2 fitted frames lie 0.0901 mm rms from their traces as stated, 0.0901 mm")
+    assert said.endswith(": calibrating has gained nothing there")
+    assert gained([row | {"after_mm": 0.02} for row in frames]).endswith("0.0200 mm as calibrated")
+    assert gained([]) == gained([{"depth_mm": 10.0, "before_mm": None, "after_mm": 0.1}]) == ""
