@@ -23,9 +23,11 @@ from pipeline.run.stages.known import Frame
 from pipeline.run.store import digest
 from pipeline.status import FrameStatus
 from pipeline.study.manifest import Case
+from reports import tables
 from reports.atomic import write_text
 from reports.case_files import GOOD, find_cases
 from reports.records import AGAIN, read_json
+from reports.schema import ERRORS
 
 LOST = {
     "crashed": "the case ended in an unexpected error; its log has the traceback",
@@ -133,7 +135,7 @@ def _found(folder: Path) -> Result:
         result = read_result(path)
     except ValueError as error:
         what = f"{path}: it is missing, or a key of it; {AGAIN}" if isinstance(error, ValidationError) else str(error)
-        return lost(folder.name, "damaged", altered or what)
+        return lost(folder.name, "damaged", altered or what, frames=_planned(folder, written))
     if altered:
         return lost(folder.name, "damaged", altered, result)
     if result.case != folder.name:
@@ -146,6 +148,12 @@ def _found(folder: Path) -> Result:
             folder.name, "damaged", f"{folder}: {ledger.FILE} is missing or cannot be read; run the case again", result
         )
     return result
+
+
+def _planned(folder: Path, written: ledger.Ledger | None) -> int:
+    """Number of frames of a case whose result cannot be read: rows of its errors.csv, if that is as it was written."""
+    whole = written is not None and ERRORS.file in written.files and not written.amiss(folder, (ERRORS.file,))
+    return len(tables.read(folder / ERRORS.file, ERRORS)) if whole else 0
 
 
 def names_of(case: Case, known: Known) -> tuple[str, ...]:
@@ -181,13 +189,15 @@ def untold(name: str) -> Result:
     return Result(name, "validation", "", "ok", "", [], [], {"case": name, "frames": 0, "frames_ok": 0, "status": "ok"})
 
 
-def lost(name: str, status: str, reason: str, case: Case | Result | None = None, stage: str = "") -> Result:
+def lost(
+    name: str, status: str, reason: str, case: Case | Result | None = None, stage: str = "", frames: int = 0
+) -> Result:
     """The result of a case that could not be finished, or of whose result a file cannot be read (see LOST).
 
-    case : what is known of it, so that its frames are not missing among those that were planned.
+    case : what is known of it, so that its frames are not missing among those that were planned; else ``frames``.
     """
     sentence = LOST[status]
-    role, group, frames = (case.role, case.group, case.frame_count) if case else ("", "", 0)
+    role, group, frames = (case.role, case.group, case.frame_count) if case else ("", "", frames)
     summary: dict[str, Any] = {"case": name, "group": group, "role": role, "status": status}
     summary |= {"frames": frames, "frames_ok": 0, "frames_failed": frames}
     summary |= {"within_1mm": 0.0} if frames else {}

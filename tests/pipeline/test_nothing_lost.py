@@ -206,6 +206,19 @@ def test_a_file_of_a_case_that_is_none_is_named(
     assert list(pd.read_csv(out / "summary.csv")["status"]) == ["damaged"]
 
 
+def test_the_frames_of_a_case_without_a_result_are_counted_as_planned(out: Path) -> None:
+    """With result.json cut in half there were none, with errors.csv altered they were all there."""
+    planned = len(pd.read_csv(case_of(out) / "errors.csv"))
+    path = case_of(out) / "result.json"
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+    assert main(["report", str(out), "--overview"]) == 1
+    row = pd.read_csv(out / "summary.csv").iloc[0]
+    assert (row["frames"], row["frames_ok"], row["frames_failed"]) == (planned, 0, planned)
+    (case_of(out) / "errors.csv").write_text("", encoding="utf-8")
+    assert main(["report", str(out), "--overview"]) == 1
+    assert list(pd.read_csv(out / "summary.csv")["frames"]) == [0]
+
+
 def test_a_result_of_another_kind_is_damaged_without_its_ledger_too(out: Path) -> None:
     path = case_of(out) / "result.json"
     path.write_text(json.dumps(json.loads(path.read_text(encoding="utf-8")) | {"config": []}), encoding="utf-8")
