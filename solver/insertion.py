@@ -25,6 +25,10 @@ from solver.wire import GuideWire
 from solver.workspace import Workspace
 
 ROLL_STEP_DEG = Range(1e-6, 1e6)
+RUBBING_STEP_MM = 0.1
+"""Longest step with friction, whose error is of first order: against steps of 0.05 mm 31 of 4,250 depths of 180 random
+vessels are more than 0.03 mm off without a flag with steps of 1 mm, up to 7 mm, 8 with 0.25 and none with 0.1. A flag
+have 23, 11 and 4 % of them, and since fewer steps are taken again, 0.1 mm takes 1.2 times as long as 1 mm."""
 RUBBING_TURN_DEG = 1.0
 """Longest roll with friction, whose direction is that at a step's end for all of its way: against rolls of 0.1 degrees
 a curved tip is 0.26 mm off with 15, 0.09 with 5 and 0.015 with 1."""
@@ -40,7 +44,7 @@ class Insertion:
     points along material_axis (default: the world axis least aligned with entry_direction, made orthogonal).
     method : "newton" or "closed_form".     initial : "slide" (material moves along the wire's own curve) or
     "translate" (the paper's section 4.1).     step_mm, roll_step_deg : longest step; with friction on the wall no
-    roll is longer than 1 degree.
+    step is longer than 0.1 mm and no roll than 1 degree.
     finest_mm : a step whose change of energy does not match the hand's work is repeated in shorter ones, down to this
     length; step_mm or more: never.
     tolerance, max_iterations, quadrature : see ``solver.relax.Settings``.     max_joints : longest wire accepted.
@@ -247,7 +251,7 @@ def _steps(
     step = number("insertion", "step_mm", step_mm, LENGTH_MM)
     turn = number("insertion", "roll_step_deg", roll_step_deg, ROLL_STEP_DEG)
     if wall is not None and wall.friction > 0.0:
-        turn = min(turn, RUBBING_TURN_DEG)
+        step, turn = min(step, RUBBING_STEP_MM), min(turn, RUBBING_TURN_DEG)
     return step, turn, number("insertion", "finest_mm", finest_mm, FINEST_MM)
 
 

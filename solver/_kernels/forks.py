@@ -61,7 +61,7 @@ def back_again(handle: Any, k: int, outcome: int, energy: float, other: float) -
         apart = 0.0
     copy_state(problem, SPARE, CURRENT, k)
     if problem.friction.coefficient > 0.0:
-        take_loads(problem, CURRENT, k)
+        take_loads(problem, CURRENT, k, 1.0)
     if problem.shaft.drag > 0.0:
         total_energy(problem, CURRENT, 0, k)
     handle.report[0] = handle.report[2]

@@ -88,13 +88,14 @@ def friction_derivatives(problem: Problem, slot: int, n: int, p: int, frame: Nin
 
 
 @kernel
-def take_loads(problem: Problem, slot: int, k: int) -> float:
+def take_loads(problem: Problem, slot: int, k: int, share: float) -> tuple[float, float]:
     """Take loads, normals and places of the contacts from a state; return how much that changes the friction.
 
-    That is the largest change of a load, or of a load's lever for the torque, over the largest load.
+    That is the largest change of a load, or of a load's lever for the torque, over the largest load; and the change of
+    all loads together, N.     share : of the change of a load that is taken.
     """
     friction, chain, state = problem.friction, problem.chain, problem.state
-    change, largest = 0.0, 0.0
+    change, largest, total = 0.0, 0.0, 0.0
     for n in range(1, k + 1):
         frame = load9(state.r[slot], n)
         for p in range(chain.first[n], chain.first[n + 1]):
@@ -107,12 +108,23 @@ def take_loads(problem: Problem, slot: int, k: int) -> float:
                 change = max(change, load * turned)
             change = max(change, abs(load - friction.load[p]))
             largest = max(largest, load)
-            friction.load[p] = load
+            total += load - friction.load[p]
+            friction.load[p] = max(friction.load[p] + share * (load - friction.load[p]), 0.0)
         store_start(problem, n)
     if largest > 0.0:
-        return change / largest
+        return change / largest, total
     # a wire that friction has lifted off the wall is not at rest without it
-    return 1.0 if change > 0.0 else 0.0
+    return (1.0 if change > 0.0 else 0.0), total
+
+
+@kernel
+def hold_on(problem: Problem, k: int) -> None:
+    """Let each contact hold with no less than the load of the step before, until the shape has told its load."""
+    friction, chain = problem.friction, problem.chain
+    end = chain.first[k + 1] - 1
+    for p in range(chain.first[1], end + 1):
+        if friction.load[p] > 0.0:
+            friction.load[p] = max(friction.load[p], friction.pressed[end - p])
 
 
 @inlined

@@ -110,8 +110,10 @@ def judge(handle: Any, outcome: int, iterations: int, limit: float) -> tuple[boo
     at = handle.place[0]
     if iterations > limit or handle.problem.scratch.counters[0].passed >= handle.limits.work:
         return False, data.MAX_ITERATIONS
-    # outside the grid or without a finite energy a shorter step does not help
-    helps = at.shrink > tol.SMALLEST_STEP and outcome != data.LEFT_GRID and outcome != data.NON_FINITE
+    # without a finite energy a shorter step does not help; outside the grid where one may have led elsewhere: friction
+    # has several states at rest
+    least = handle.introducer.finest if handle.problem.friction.coefficient > 0.0 else 1.0
+    helps = at.shrink > (least if outcome == data.LEFT_GRID else tol.SMALLEST_STEP) and outcome != data.NON_FINITE
     if outcome == data.CONVERGED:
         at.shrink = min(1.0, 2 * at.shrink)
     elif outcome == data.ROUGH:
@@ -238,11 +240,10 @@ def allowed(
 
 @inlined
 def likeness(problem: Problem, at: Any, depth: float, roll: float) -> float:
-    """Length of this step over that of the last one, or 0 where it is of another kind: rolled, back, or much longer."""
+    """Share of the last step's change to start with: this step's length over its, or 0 where it is of another kind."""
     if not problem.skips.foresight or at.last_step == 0.0 or at.last_turn != 0.0 or roll != at.roll:
         return 0.0
-    share = (depth - at.inserted) / at.last_step
-    return share if 0.0 < share <= tol.MOST_FORESEEN else 0.0
+    return min(max((depth - at.inserted) / at.last_step, 0.0), tol.MOST_FORESEEN)
 
 
 @cached

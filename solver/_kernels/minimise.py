@@ -10,9 +10,9 @@ from solver import _tolerances as tol
 from solver._kernels import closed_form, newton_method
 from solver._kernels.data import CONVERGED, FOLDED, FRICTION, MAX_ITERATIONS, NON_FINITE, UNFINISHED, Limits, Problem
 from solver._kernels.energy import energy_of, total_energy
-from solver._kernels.flags import cached, kernel, merged
+from solver._kernels.flags import cached, inlined, kernel, merged
 from solver._kernels.forces import copy_state, forget_forces, least_turn_cosine
-from solver._kernels.friction import take_loads
+from solver._kernels.friction import hold_on, take_loads
 from solver._kernels.newton import costate
 
 METHODS = ("newton", "closed_form")
@@ -69,8 +69,10 @@ def relax_with_friction(
     counters.relaxations_without_twist += not problem.twisting
     problem.scratch.descent[0].forked = 0
     if rubs:
-        take_loads(problem, slot, k)
+        take_loads(problem, slot, k, 1.0)
+        hold_on(problem, k)
     outcome, iterations, most, energy = FRICTION, 0, 0, 0.0
+    share, change, total = 1.0, math.inf, 0.0
     cost = k + problem.chain.first[k + 1]
     for _ in range(tol.FRICTION_ROUNDS):
         if rubs:
@@ -82,10 +84,26 @@ def relax_with_friction(
         counters.passed += used * cost
         if result != slot:
             copy_state(problem, result, slot, k)
-        if outcome != CONVERGED or not rubs or take_loads(problem, slot, k) < tol.FRICTION_CHANGE:
+        if outcome != CONVERGED or not rubs:
             break
+        was, before = change, total
+        change, total = take_loads(problem, slot, k, share)
+        if change < tol.FRICTION_CHANGE:
+            break
+        share = next_share(share, change / was, total * before)
         outcome = FRICTION
     return shape_of(problem, slot, k) if outcome == CONVERGED else outcome, iterations, most, energy
+
+
+@inlined
+def next_share(share: float, growth: float, same: float) -> float:
+    """Share of the next change of the loads that is taken, by how the last one grew and whether its sign was the same.
+
+    Loads that fall ever faster are a wire that friction lets go of: it is followed. Loads that swing are damped.
+    """
+    if same < 0.0:
+        return max(0.5 * min(share, 1.0), tol.FRICTION_SHARES[0])
+    return min(tol.FRICTION_FASTER * share, tol.FRICTION_SHARES[1]) if growth > tol.FRICTION_CREEPS else 1.0
 
 
 @cached

@@ -156,9 +156,10 @@ def test_forces_after_a_failed_step_are_those_of_the_state_that_is_kept() -> Non
     """The tip leaves the grid within the last step: that step's length, loads and friction are forgotten."""
     grid = sampled(bend_distance, 0.3, (-5, -5, -5), (15, 5, 65), "float32")
     wall = VesselWall(grid, 1.0, friction=0.3)
-    insertion = Insertion(WIRE, wall, [0, 0, 0], [0, 0, 1], tip_load_N=[0.0, 0.004, 0.0])
+    insertion = Insertion(WIRE, wall, [0, 0, 0], [0, 0, 1], tip_load_N=[0.0, 0.004, 0.0], finest_mm=1.0)
     good = None
-    for depth in np.arange(1.0, 90.0, 0.7):
+    depths = np.arange(1.0, 90.0, 0.05)  # less than the longest step with friction: each is one step, or none
+    for depth in depths:
         solution = next(insertion.to_depths([depth]))
         if not solution.converged:
             break
@@ -169,8 +170,8 @@ def test_forces_after_a_failed_step_are_those_of_the_state_that_is_kept() -> Non
     np.testing.assert_array_equal(solution.contact_force_N, good.contact_force_N)
     assert solution.push_force_N == pytest.approx(good.push_force_N, rel=1e-12)
     # and the wire goes on from there as if nothing had been tried
-    again = Insertion(WIRE, wall, [0, 0, 0], [0, 0, 1], tip_load_N=[0.0, 0.004, 0.0])
-    last(again, np.arange(1.0, good.depth_mm + 0.1, 0.7))
+    again = Insertion(WIRE, wall, [0, 0, 0], [0, 0, 1], tip_load_N=[0.0, 0.004, 0.0], finest_mm=1.0)
+    last(again, depths[depths < good.depth_mm + 0.01])
     one, other = last(insertion, [good.depth_mm - 1.0]), last(again, [good.depth_mm - 1.0])
     np.testing.assert_allclose(one.contact_force_N, other.contact_force_N, rtol=0.0, atol=1e-12)
 

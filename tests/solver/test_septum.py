@@ -63,10 +63,10 @@ def test_the_wire_does_not_come_through_a_septum_of_two_voxels() -> None:
     first = next(s for s in found if not s.converged)
     assert first.status is Status.THROUGH_WALL
     assert "wall" in first.sentence
-    # the last good state is kept, and it is what later depths return
+    # the last good state is kept, and it is what later depths return, to the shortest of the steps that are tried
     before = [s for s in found if s.converged][-1]
-    assert before.depth_mm <= first.depth_mm == found[-1].depth_mm
-    np.testing.assert_array_equal(first.joints_mm, found[-1].joints_mm)
+    assert before.depth_mm <= first.depth_mm <= found[-1].depth_mm < first.depth_mm + 0.005
+    np.testing.assert_allclose(first.joints_mm, found[-1].joints_mm, rtol=0.0, atol=0.02)
 
 
 def smoothed(grid: Grid, sigma: float) -> Grid:
