@@ -28,7 +28,7 @@ def guard_out(out: Path, manifest: Path, settings: Resolved) -> None:
     """Refuse an output folder that holds something else than a run of the same manifest with the same settings."""
     if (out / "simulators").is_dir():
         raise UsageError([f"-o {out}: it holds a score of other simulators' wires; name another folder"])
-    allowed = "say --resume (keep what fits) or --fresh (compute again)"
+    allowed = "say --resume (keep what fits) or --fresh (compute again); in Python resume=True or fresh=True"
     # a run that ended before its first file was whole leaves nothing but that file's temporary name
     if not out.exists() or all(path.name.startswith(".") for path in out.iterdir()):
         return

@@ -47,7 +47,8 @@ KEYS = {
     "spacing_mm": "Voxel size, for files that lack it; reported as assumed.",
     "lumen": "Own lumen instead of a segmented one: label map, .stl, .vtp, or centreline with radii (.swc, .mrk.json); "
     '`{file = "seg.nrrd", label = 2}` takes one label, by number or name, `{file = ..., level = 0.5}` a probability.',
-    "traces": "Own or corrected centrelines instead of traced ones, one file per frame.",
+    "traces": "Own or corrected centrelines instead of traced ones, one file per frame: .csv (x_mm, y_mm, z_mm, LPS "
+    "unless a line says # space: RAS or # unit: m), .vtp, 3D Slicer's .mrk.json.",
     "parameters": "What `wireval calibrate` wrote.",
     "roll_deg": 'Roll about entry_direction, right-handed: one number, one per frame, or `"fit"`: on the first frame, '
     "which is not scored.",
