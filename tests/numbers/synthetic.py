@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import astuple
 from functools import partial
 
 import numpy as np
@@ -37,13 +38,18 @@ def distances(anatomy: Anatomy) -> Numbers:
 
 
 def planned() -> Numbers:
-    """What is planned of every scene of the catalogue, with its vessels."""
+    """What is planned of every scene of the catalogue, with its vessels, and how it is scanned."""
     found = {}
     for name in catalogue.names():
-        setup = catalogue.describe(name).setup(np.random.default_rng([0, 1]), 3)
+        scene = catalogue.describe(name)
+        setup = scene.setup(np.random.default_rng([0, 1]), 3)
         place = [*setup.entry_mm, *setup.direction, *setup.material_axis, *setup.centre_mm]
         plan = [*setup.depths_mm, *setup.rolls_deg, setup.stiffness_N_mm2, setup.friction, len(setup.others)]
         shown = [] if setup.motion_mm is None else setup.motion_mm.ravel()
+        scan = [scene.fov_mm, scene.size, scene.frames, scene.voxels_across, *setup.spacing_ratio]
+        wires = [digest(points) + [radius] for points, radius in setup.others]
+        wire = [setup.wire.radius_mm, setup.wire.bending_N_mm2, setup.wire.rest_curvature_per_mm]
+        found[f"{name}-scanned"] = [*scan, *astuple(setup.greys), *np.ravel(wires), *np.hstack([*map(np.ravel, wire)])]
         vessels = distances(setup.anatomy)
         found[name] = [*place, *plan, *shown, *np.ravel(vessels["distance"]), *np.ravel(vessels["gradient"])]
     return found

@@ -13,7 +13,7 @@ import pytest
 import SimpleITK as sitk
 
 from pipeline.arrays.grids import corners_mm
-from pipeline.load import Crop, LoadError, Source, each_volume, load, read_header, require_same_geometry
+from pipeline.load import Crop, LoadError, Source, each_volume, load, outside, read_header, require_same_geometry
 from pipeline.load.config import LoadConfig
 from pipeline.load.files import parts as file_parts
 from pipeline.run.hashing import file_hash
@@ -47,6 +47,30 @@ def test_every_format_keeps_values_axes_and_geometry(tmp_path: Path, suffix: str
     np.testing.assert_allclose(
         volume.to_mm([2, 3, 4]), np.array(ORIGIN) + TURN @ (np.array(SPACING) * (2, 3, 4)), rtol=1e-5
     )
+
+
+@pytest.mark.parametrize(
+    ("words", "numbers"),
+    [
+        ("s_%03d.raw", (1, 2, 3)),
+        ("s_%03d.raw 5 7", (5, 6, 7)),
+        ("s_%03d.raw 99990 99993", (99990, 99991, 99992, 99993)),
+        ("s_%03d.raw 4 10 3", (4, 7, 10)),
+        ("s_%03d.raw 4 4", (4,)),
+    ],
+)
+def test_numbered_files_are_those_of_their_pattern(words: str, numbers: tuple[int, ...]) -> None:
+    """A high first number is no long list; three slices are meant where none are counted."""
+    found = outside.numbered(Path("/study/scan.mhd"), words.split(), 3)
+    assert [path.name for path in found] == [f"s_{number:03d}.raw" for number in numbers]
+
+
+@pytest.mark.parametrize(
+    "words", ["s_%03d.raw 4 3", "s_%03d.raw 1 9 0", "s_%03d.raw 1 9999999", "s.raw 1 3", "%d_%d 1 3"]
+)
+def test_numbered_files_that_cannot_be_meant_are_refused(words: str) -> None:
+    with pytest.raises(LoadError):
+        outside.numbered(Path("/study/scan.mhd"), words.split(), 3)
 
 
 @pytest.mark.parametrize("suffix", [".mha", ".nrrd", ".nii.gz"])

@@ -730,10 +730,17 @@ def test_pages_of_many_cases_are_drawn_with_a_line_each(
     assert "drawn" not in capsys.readouterr().err, "of a few there is no line each"
 
 
-def test_whether_the_lumen_was_segmented_beside_a_wire_is_said(finished: Path) -> None:
-    """Of a study with a reference it is not: the scan that it is segmented from has no wire."""
-    result = json.loads((finished / "cases" / "bifurcation" / "result.json").read_text(encoding="utf-8"))
-    assert not [text for text in result["assumptions"] if "segmented from frame 0" in text]
+def test_whether_the_lumen_was_segmented_beside_a_wire_is_said(finished: Path, tmp_path: Path, study: Path) -> None:
+    said = "no reference scan: the lumen was segmented from frame 0, which has a wire in it"
+    with_one = json.loads((finished / "cases" / "bifurcation" / "result.json").read_text(encoding="utf-8"))
+    assert said not in with_one["assumptions"]
+    shutil.copytree(study, tmp_path / "study")
+    manifest = tmp_path / "study" / "manifest.toml"
+    lines = manifest.read_text(encoding="utf-8").splitlines(keepends=True)
+    manifest.write_text("".join(s for s in lines if not s.startswith("reference")), encoding="utf-8")
+    run(tmp_path / "study", tmp_path / "out", "--until", "segment")
+    result = json.loads((tmp_path / "out" / "cases" / "bifurcation" / "result.json").read_text(encoding="utf-8"))
+    assert said in result["assumptions"]
 
 
 def test_a_damaged_result_hides_no_other(
