@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 
 from reports._content import NOTHING, flatten, grid, number
+from reports.case_files import counted
 from reports.page import draw_sections, write_page
 from reports.records import read_json
 from reports.schema import Column
@@ -20,8 +21,8 @@ USED = "what parameters.toml holds: of a parameter that is not seen what is stat
 FACTOR_FROM = 0.3
 """Standard deviation of a logarithm from which it is told as a factor."""
 OF_FACTORS = "of a factor in percent, or, where it is large, as what to multiply and to divide the value by"
-NOTHING_GAINED = 0.98
-"""Error after calibrating over the one before from which nothing was gained."""
+GAINED = 0.98
+"""Error after calibrating over the one before from which the wires are not called nearer."""
 COLUMNS = (
     Column("parameter", "-", "a factor on what the manifest states, or in the unit that its name ends with", "text"),
     Column("value", "-", "where the wires meet the traces best", "text"),
@@ -86,7 +87,7 @@ def _planned(row: dict[str, Any]) -> dict[str, Any]:
 
 
 def _spread(row: dict[str, Any], key: str) -> str:
-    """A standard deviation; that of a factor in percent, or, where these would reach below zero, as a factor itself."""
+    """A standard deviation; that of a factor in percent, or from 30 % on as a factor itself."""
     sd = float(row[key])
     if row["logarithmic"]:
         return f"a factor of {number(float(np.exp(sd)), 2)}" if sd > FACTOR_FROM else f"{number(100 * sd, 2)} %"
@@ -101,10 +102,10 @@ def gained(frames: Sequence[Mapping[str, Any]]) -> str:
     before, after = (
         float(np.sqrt(np.average(known[name] ** 2, weights=known["depth_mm"]))) for name in ("before_mm", "after_mm")
     )
-    nothing = ": calibrating has gained nothing there" * (after > NOTHING_GAINED * before)
+    said = "" if after < GAINED * before else ": no nearer" if after < before / GAINED else ": farther away"
     return (
-        f"the wires of the {len(known)} fitted frames lie {number(before)} mm rms from their traces as stated, "
-        f"{number(after)} mm as calibrated{nothing}"
+        f"the wires of {counted(len(known), 'fitted frame')} lie {number(before)} mm rms from their traces as stated, "
+        f"{number(after)} mm as calibrated{said}"
     )
 
 

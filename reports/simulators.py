@@ -39,7 +39,7 @@ def render_simulators(out_dir: Path, embed: bool = False) -> Path:
     page = {
         "title": "Simulators side by side - wireval",
         "names": list(folders),
-        "first": next(iter(folders_in(out_dir))),
+        "first": next(iter(warnings)),
         "said": [
             {"name": name, "link": links[name]}
             | _said(alone[name], folder, alien[name], copied.get(name, ""), few=name in few)

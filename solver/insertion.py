@@ -251,9 +251,12 @@ def _steps(
     """The longest step and roll, and the finest step, each a number that can be used."""
     step = number("insertion", "step_mm", step_mm, LENGTH_MM)
     turn = number("insertion", "roll_step_deg", roll_step_deg, ROLL_STEP_DEG)
+    finest = number("insertion", "finest_mm", finest_mm, FINEST_MM)
     if wall is not None and wall.friction > 0.0:
+        # steps that may be taken again in shorter ones still may
+        finest = finest if finest >= step else min(finest, 0.5 * RUBBING_STEP_MM)
         step, turn = min(step, RUBBING_STEP_MM), min(turn, RUBBING_TURN_DEG)
-    return step, turn, number("insertion", "finest_mm", finest_mm, FINEST_MM)
+    return step, turn, finest
 
 
 def _each_of(name: str, values: float | Sequence[float], allowed: Range, count: int) -> list[float]:

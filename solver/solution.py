@@ -23,7 +23,7 @@ class Status(Enum):
         "the energy can no longer be lowered but the wire is not at rest within solver.tolerance; "
         "loosen solver.tolerance, or lower the ratio of wall to bending stiffness"
     )
-    FRICTION = "the friction forces did not settle; lower wall.friction or shorten solver.step_mm"
+    FRICTION = "the friction forces did not settle; lower wall.friction, or take solver.step_mm = 0.05 or 0.02"
     FOLDED = "the wire folded at a joint (turned by more than 90 degrees); use shorter segments or smaller steps"
     LEFT_GRID = "the wire left the wall's grid; give a larger grid, or check entry point and direction"
     THROUGH_WALL = (

@@ -56,7 +56,6 @@ def _fit(args: argparse.Namespace, cases: "tuple[Case, ...]", config: "Config", 
     from pipeline.run.calibration import calibrate, file_in, gathered
     from pipeline.run.calibration_files import flattened, misfit, write_parameters, write_record
     from reports.calibration import gained, render_calibration
-    from reports.records import read_json
 
     found = gathered(cases, config, store, say)
     fit = calibrate(found, config)
@@ -70,7 +69,8 @@ def _fit(args: argparse.Namespace, cases: "tuple[Case, ...]", config: "Config", 
         apart = f"  of {one.value:g}, with what is not seen free as well" * (f"{one.value:g}" != f"{one.used:g}")
         verdict = apart if one.seen else unseen
         say(f"{one.name:20s} {one.used:10g}  +- {sd:8s}{verdict}")
-    say(gained(read_json(args.out / "calibration.json")["frames"]))
+    if said := gained([vars(frame) for frame in fit.frames]):
+        say(said)
     for warning in (*misfit(fit), *flattened(found)):
         say(f"warning: {warning}")
     for note in found.left_out:

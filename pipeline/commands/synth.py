@@ -39,7 +39,7 @@ def add_arguments(parser: ArgumentParser) -> None:
         help="into the same phantom, each rolled anew, in one manifest",
     )
     add("-j", "--jobs", type=int, default=1, metavar="N", help="insertions made at once (default 1)")
-    add("--size", type=int, metavar="N", help="voxels along each axis; a scene that needs more says so")
+    add("--size", type=int, metavar="N", help="voxels along each axis; each scene has a least number, which is told")
     add("--voxel-mm", type=float, metavar="V", help="size of a voxel")
     add("--seed", type=int, default=0, metavar="S", help="of what is drawn at random (default 0)")
     add("--friction", type=float, metavar="F", help="Coulomb's coefficient of the true wire and the wall")

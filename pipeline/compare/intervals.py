@@ -118,7 +118,8 @@ def effective_frames(values: Sequence[Array]) -> float:
     """Number of independent frames that would tell as much. values : (n,) of each insertion's frames, in their order.
 
     The model: successive frames have one correlation (pooled, corrected for its bias of -(1 + 3 r) / n), and insertions
-    have a variance of their own. At least 1 for each insertion; NaN where it cannot be known: none has four frames.
+    have a variance of their own. Of insertions that are equally long at least 1 for each; NaN where it cannot be known:
+    none has four frames.
     """
     own = [np.asarray(v, dtype=float) - np.mean(v) for v in values if len(v) > 3]
     if not own or not sum(float(v @ v) for v in own):
@@ -127,12 +128,12 @@ def effective_frames(values: Sequence[Array]) -> float:
     lag = sum(float(v[1:] @ v[:-1]) for v in own) / sum(float(v @ v) for v in own)
     r = float(np.clip((lag + 1 / length) / max(1 - 3 / length, 0.25), 0.0, 0.95))
     # variance of an insertion's mean, over that of its frames; these vary about it by what is left
-    mean = np.array([_slower(int(n), r) / n for n in frames])
-    left = sum(float(v @ v) for v in own) / sum(len(v) * max(1 - _slower(len(v), r) / len(v), 0.2) for v in own)
+    of_mean = np.array([_slower(int(n), r) / n for n in frames])
+    within = sum(float(v @ v) for v in own) / sum(len(v) * max(1 - _slower(len(v), r) / len(v), 0.2) for v in own)
     means = np.array([np.mean(v) for v in values])
-    between = max(float(means.var(ddof=1)) - left * float(mean.mean()), 0.0) if len(means) > 1 else 0.0
+    between = max(float(means.var(ddof=1)) - within * float(of_mean.mean()), 0.0) if len(means) > 1 else 0.0
     shares = (frames / frames.sum()) ** 2
-    told = (left + between) / float(shares @ (between + left * mean))
+    told = (within + between) / float(shares @ (between + within * of_mean))
     return float(np.clip(told, 1.0, frames.sum()))
 
 

@@ -72,7 +72,7 @@ class Registration:
     misfit_voxels : residual of that fit, as the uncertainty of one point.  centre_shift_mm : (3,) of the
     wall's centroid; the motion's own shift is that of the world's origin, which may be far away.  loose_mm : how far
     along (or about) itself the vessel may have moved besides, and the frame shows it as well.  noise_voxels : what
-    noise alone makes of the misfit.
+    noise alone makes of the misfit, where it is not ``trusted``; else 0.
     """
 
     motion: Motion = field(default_factory=Motion)
@@ -173,7 +173,7 @@ def register(frame: Volume, to: Anchor, skip_voxels: float) -> Registration:
     last, _ = look(frame, wall, motion)
     left = farthest(last.motion.after(motion), wall)
     if last.misfit_voxels > BAD_MISFIT_VOXELS:
-        noise = wall.noise_voxels
+        noise = wall.noise_voxels(static_points(frame, wall.points_mm, to.patch_mm).noise)
         return Registration(moved_voxels=moved, left_voxels=left, misfit_voxels=last.misfit_voxels, noise_voxels=noise)
     if (far := farthest(motion, wall)) < skip_voxels:
         return _still(wall, look(frame, wall, Motion())[0], far)

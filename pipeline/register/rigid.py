@@ -134,6 +134,8 @@ def rigid(frame: Volume, reference: Volume, edges: NDArray[np.bool_], centre_mm:
     method.SetInitialTransform(start, inPlace=True)
     try:
         method.Execute(fixed, moving)
-    except RuntimeError:  # no sample lies on an edge: noise hides them, or metal covers them
-        return Motion()
+    except RuntimeError as error:
+        if "FixedSampledPointSet" not in str(error):
+            raise
+        return Motion()  # no sample lies on an edge: noise hides them, or metal covers them
     return Motion(np.reshape(start.GetMatrix(), (3, 3)), np.array(start.TransformPoint((0.0, 0.0, 0.0))))

@@ -17,7 +17,7 @@ from pipeline.run.exchanged import exchanged
 from pipeline.run.overall import found_cases, frames_of, overall, shared_scans, strangers, validation
 from pipeline.run.results import Result, write_json
 from reports import tables
-from reports.case_files import GOOD, not_reached
+from reports.case_files import GOOD, doubted, not_reached
 from reports.junit import Outcome, write_junit
 from reports.origin import mixed_settings
 from reports.schema import FAILURES, OVERALL_FILE, SUMMARY, TIMINGS
@@ -57,6 +57,11 @@ def aggregate(out: Path, run_info: dict[str, Any] | None = None, name: str = "ru
     cases, mixed = found_cases(out), mixed_settings(out)
     among = [] if mixed else with_another(out, cases)
     found, whole = [case.result for case in cases], {} if mixed else overall(among)
+    doubts = doubted(out)
+    if run_info is not None:
+        doubts = [*run_info.get("doubts", ()), *copies(validation(among)), *exchanged(out, validation(among))]
+    if whole:
+        whole["warnings"] += len(doubts)
     rows, (times, replayed_s) = [result.summary for result in found], _times(out, found)
     failures = [row for result in found for row in result.failures]
     for file, table, given in (
@@ -70,7 +75,6 @@ def aggregate(out: Path, run_info: dict[str, Any] | None = None, name: str = "ru
     tables.write(out / TIMINGS.file, TIMINGS, times)
     if run_info is not None:
         assumed = [*run_info.get("assumptions", ()), *shared_scans(found), *strangers(found)]
-        doubts = [*run_info.get("doubts", ()), *copies(validation(among)), *exchanged(out, validation(among))]
         cases_of = {"assumptions": assumed, "doubts": doubts, "cases": [result.case for result in found]}
         write_json(out / name, run_info | cases_of | {"overall": whole})
     pooled = [] if mixed else frames_of(validation(cases))

@@ -101,6 +101,7 @@ def misfit(fit: Calibration) -> list[str]:
     ]
 
 
+THINNEST_VOXELS = 0.48
 FLATTENING_VOXELS = 0.9
 """Diameter of a wire in voxels below which its curved tip is traced too flat."""
 
@@ -115,9 +116,9 @@ def _too_flat(voxels: float) -> float:
     """The share by which the curve of a tip so thick is traced too flat.
 
     Measured on bends of three seeds each (docs/howto/calibrate.md): 9 % with a diameter of 0.48 voxels, 2 % with 0.72,
-    less than 1 % with 0.96.
+    less than 1 % with 0.96; of thinner ones more, which nobody has measured.
     """
-    return 0.02 * (0.72 / voxels) ** 3.7 if voxels < FLATTENING_VOXELS else 0.0
+    return 0.02 * (0.72 / max(voxels, THINNEST_VOXELS)) ** 3.7 if voxels < FLATTENING_VOXELS else 0.0
 
 
 def flattened(found: Gathered) -> list[str]:

@@ -38,7 +38,7 @@ class SolverConfig:
     max_iterations: PositiveCount = 200
     """Iterations allowed for one relaxation."""
     step_mm: Step = 1.0
-    """Longest insertion step; shortened where the scene asks for it, with friction to 0.1 mm."""
+    """Longest insertion step; shortened where the scene asks for it, with friction on the wall to 0.1 mm."""
     finest_mm: Step = 0.05
     """Steps in which the wire gives way are taken again, down to this length; step_mm or more: never."""
     initial: Literal["slide", "translate"] = "slide"

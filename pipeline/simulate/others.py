@@ -63,11 +63,16 @@ def oddity(
     wrong = _misplaced(points_mm, entry_mm, direction)
     if not wrong:
         return ""
-    readings = _readings(points_mm, unit, depth_mm)
+    readings = _readings(points_mm, unit)
     # one that only just passes, too, explains nothing
     near = 0.5 * AT_ENTRY_MM
-    found = next((name for name, other in readings if not _misplaced(other, entry_mm, direction, near)), "")
-    return wrong + (f": it would if it were {found}" if found else "; check its coordinates")
+    for name, other in readings:
+        # what lies behind the entry's plane is in the introducer, and no part of a depth
+        length_mm = float(arc_length(begun(other, entry_mm, direction))[-1])
+        scaled = not np.isclose(arc_length(other)[-1], arc_length(points_mm)[-1])
+        if not _misplaced(other, entry_mm, direction, near) and not (scaled and _far_from(depth_mm, length_mm)):
+            return f"{wrong}: it would if it were {name}"
+    return f"{wrong}; check its coordinates"
 
 
 def _turned_back(points_mm: Array) -> int:
@@ -93,15 +98,13 @@ def _misplaced(points_mm: Array, entry_mm: Array, direction: Array, near_mm: flo
     return ""
 
 
-def _readings(points_mm: Array, unit: str, depth_mm: float) -> Iterator[tuple[str, Array]]:
+def _readings(points_mm: Array, unit: str) -> Iterator[tuple[str, Array]]:
     """Other readings of the numbers (point order, axes, units), each with its points; fewest changes first."""
-    length_mm = float(arc_length(points_mm)[-1])
     orders = {"": points_mm, "read from its other end (tip first)": points_mm[::-1]}
     spaces = {"": np.eye(3), "RAS": np.diag(MIRROR)}
     written = {"": np.eye(3)} | {f"written as {name}": np.eye(3)[list(axes)] for name, axes in AXES.items()}
     stated = f", not in {unit}" * (unit != "mm")
     units = {"": 1.0} | {f"in {name}{stated}": factor for name, factor in other_units(unit).items()}
-    units = {name: factor for name, factor in units.items() if not name or not _far_from(depth_mm, factor * length_mm)}
     ways = product(orders.items(), spaces.items(), written.items(), units.items())
     all_of_them = [tuple(zip(*named, strict=True)) for named in ways]
     for names, (points, signs, axes, factor) in sorted(all_of_them, key=lambda one: sum(map(bool, one[0]))):

@@ -110,8 +110,8 @@ def judge(handle: Any, outcome: int, iterations: int, limit: float) -> tuple[boo
     at = handle.place[0]
     if iterations > limit or handle.problem.scratch.counters[0].passed >= handle.limits.work:
         return False, data.MAX_ITERATIONS
-    # without a finite energy a shorter step does not help; outside the grid where one may have led elsewhere: friction
-    # has several states at rest
+    # without a finite energy a shorter step does not help. With friction, where several states are at rest, one out of
+    # the grid may be a hop: shorter steps are tried down to the finest (a share of the longest)
     least = handle.introducer.finest if handle.problem.friction.coefficient > 0.0 else 1.0
     helps = at.shrink > (least if outcome == data.LEFT_GRID else tol.SMALLEST_STEP) and outcome != data.NON_FINITE
     if outcome == data.CONVERGED:
@@ -240,10 +240,12 @@ def allowed(
 
 @inlined
 def likeness(problem: Problem, at: Any, depth: float, roll: float) -> float:
-    """Share of the last step's change to start with: this step's length over its, or 0 where it is of another kind."""
+    """Share of the last step's change to start with: this step's length over its, MOST_FORESEEN at most; 0 where it is
+    of another kind.
+    """
     if not problem.skips.foresight or at.last_step == 0.0 or at.last_turn != 0.0 or roll != at.roll:
         return 0.0
-    return min(max((depth - at.inserted) / at.last_step, 0.0), tol.MOST_FORESEEN)
+    return float(min(max((depth - at.inserted) / at.last_step, 0.0), tol.MOST_FORESEEN))
 
 
 @cached

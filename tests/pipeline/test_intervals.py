@@ -209,6 +209,20 @@ def test_insertions_of_few_frames_count_as_one_at_least() -> None:
         assert intervals.effective_frames([*walks]) >= 6.0 - 1e-9
 
 
+def test_insertions_of_other_lengths_may_tell_less_than_their_number() -> None:
+    """The mean is that of the longest then: six of them, one of 60 frames and five of 4, are worth 2.1 frames."""
+    draw = np.random.default_rng(6)
+
+    def walk(frames: int) -> np.ndarray:
+        own = draw.normal(size=frames)
+        for i in range(1, frames):
+            own[i] = 0.9 * own[i - 1] + np.sqrt(1 - 0.81) * own[i]
+        return np.exp(0.2 * own + draw.normal())
+
+    told = [intervals.effective_frames([walk(n) for n in (60, *5 * [4])]) for _ in range(100)]
+    assert 1.0 <= np.median(told) < 4.0
+
+
 def test_frames_tell_at_least_as_much_as_one() -> None:
     """Five frames that climb steadily: their correlation alone would make a third of a frame of them."""
     assert 1.0 <= intervals.effective_frames([np.linspace(1.0, 2.0, 5)]) < 1.2

@@ -227,6 +227,9 @@ def test_a_unit_explains_no_wire_that_it_makes_too_long() -> None:
     assert oddity(in_cm, here, up).endswith("in cm")
     assert oddity(in_cm, here, up, depth_mm=30.0).endswith("in cm")
     assert oddity(in_cm, here, up, depth_mm=3.0).endswith("check its coordinates")
+    # a wire of 120 mm, 90 of them behind the entry
+    whole = 0.1 * (here + (np.arange(121.0)[:, None] - 90.0) * up)
+    assert oddity(whole, here, up, depth_mm=30.0).endswith("in cm")
 
 
 def test_wires_in_another_order_are_told() -> None:

@@ -4,9 +4,11 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from pipeline.cli import main
+from pipeline.run.stages import segment as stage
 
 SCRIPT = """
 import sys
@@ -50,3 +52,19 @@ def test_a_tiny_wire_loads_what_frames_need(folder, reference):
     # kernels for doubtful frames alone are not met in so clear a scan
     assert after > 10
     assert before >= 0.8 * after
+
+
+@pytest.mark.parametrize(("cores", "until", "asked"), [(2, "trace", 1), (2, "segment", 0), (1, "trace", 0)])
+def test_code_is_loaded_beside_segmentation_where_there_are_cores(folder, tmp_path, monkeypatch, cores, until, asked):
+    """Of the scan's own grey values, and with a reference as it has one; what goes wrong there costs nothing."""
+    seen = []
+
+    def fails(kind, *, reference):
+        seen.append((np.dtype(kind).name, reference))
+        raise ValueError("no matter")
+
+    monkeypatch.setattr(stage, "warm_up", fails)
+    manifest, out = folder / "study" / "manifest.toml", tmp_path / "out"
+    assert main(["run", str(manifest), "-o", str(out), "--until", until, "--no-cache", "-q", "-j", str(cores)]) == 0
+    assert seen == asked * [("int16", True)]
+    assert ("loaded later" in (out / "cases" / "bend" / "log.txt").read_text(encoding="utf-8")) == bool(asked)

@@ -139,7 +139,8 @@ def test_the_ends_of_an_interval_stand_below_what_they_are_of() -> None:
 def test_a_calibration_that_gains_nothing_says_so() -> None:
     frames = [{"depth_mm": mm, "before_mm": rms, "after_mm": rms} for mm, rms in ((10.0, 0.05), (30.0, 0.1))]
     said = gained(frames)
-    assert said.startswith("the wires of the 2 fitted frames lie 0.0901 mm rms from their traces as stated, 0.0901 mm")
-    assert said.endswith(": calibrating has gained nothing there")
+    assert said.startswith("the wires of 2 fitted frames lie 0.0901 mm rms from their traces as stated, 0.0901 mm")
+    assert said.endswith("0.0901 mm as calibrated: no nearer")
+    assert gained([row | {"after_mm": 0.3} for row in frames]).endswith("0.300 mm as calibrated: farther away")
     assert gained([row | {"after_mm": 0.02} for row in frames]).endswith("0.0200 mm as calibrated")
     assert gained([]) == gained([{"depth_mm": 10.0, "before_mm": None, "after_mm": 0.1}]) == ""

@@ -77,9 +77,9 @@ def test_friction_raises_the_push_and_is_not_computed_without_a_coefficient() ->
 @pytest.mark.parametrize("hull", ["offset", "samples:16"])
 @pytest.mark.parametrize("wire", [WIRE, CURVED], ids=["straight", "curved"])
 def test_push_and_loss_do_not_depend_on_the_step(wire: GuideWire, hull: str) -> None:
-    """Steps of 1 to 0.01 mm over the last 5 mm; the hull's own radius is no way slid."""
+    """Steps of 0.1 (the longest with friction) to 0.01 mm over the last 5 mm; the hull's own radius is no way slid."""
     push, lost = [], []
-    for step in (1.0, 0.2, 0.05, 0.01):
+    for step in (0.1, 0.05, 0.02, 0.01):
         insertion = in_bend(wire, 0.2, step, hull)
         last(insertion, np.arange(1.0, 56.0))
         solution = last(insertion, [60.0])

@@ -53,14 +53,18 @@ def segment_vessel(run: Context, known: Known) -> Known:
 def _loading(run: Context, reference: bool) -> Callable[..., Lumen]:
     """``segment``, which loads the machine code of the stages to come meanwhile: it follows the vessel on one core.
 
-    Helpers, which are forked later, then need not load it, each for itself. reference : whether there is one.
+    Helpers, which are forked later, then need not load it, each for itself: they do where the lumen is given or stored.
+    reference : whether there is one.
     """
 
     def load(scan: Volume) -> None:
-        if run.goes_to("trace"):
-            warm_up(scan.values.dtype, reference=reference)
-        if run.goes_to("simulate"):
-            run.kernels()
+        try:
+            if run.goes_to("trace"):
+                warm_up(scan.values.dtype, reference=reference)
+            if run.goes_to("simulate"):
+                run.kernels()
+        except Exception as error:  # it only saves time: a stage that needs the code meets the same error, if it does
+            run.log.progress("segment", 0, 0, f"machine code is loaded later: {error!r}")
 
     @functools.wraps(segment)  # the store knows it by its name and sources
     def both(scan: Volume, *given: Any) -> Lumen:
