@@ -241,3 +241,6 @@ UNDECIDED_MM = 5.0
 off without the flag; for as long as both sides lie apart, the flag would cover 5.15 % of them instead of 4.86 %."""
 CALM_MM = 2.5
 """Way, mm, after a snap on which a wire may still lie elsewhere than after shorter steps."""
+HELD_CALM = 0.25
+"""What a mm of that way counts where friction holds the wire on the side to which it went: two were 5 to 7 mm apart,
+one of them gone by 2.5 mm later, the other still there."""

@@ -43,9 +43,9 @@ FADE_MM, BODY_FROM, FADE_SIGMA_MM = 2.5, (4.0, 12.0), 0.75
 wire whose brightness falls to 0.3 over 3 mm the end seen is 1.1 to 1.8 mm short."""
 FEWEST = (4, 2)
 """Samples of body and end that there must be, half a voxel apart."""
-FADES, FADES_SIGMAS = 0.1, 3.5
+FADES, FADES_SIGMAS = 0.1, 3.0
 """Share of its brightness, and standard deviations, by which an end fades: of 50 right ones none was beyond 0.08 and
-1.5; a jet ahead of the tip had 0.15 and 4.6."""
+1.5; jets ahead of the tip had 0.12 to 0.15, and 3.4 to 4.6."""
 BRIGHTER = 0.75
 """Which of the line's greys beyond a gap is held against it, by its rank."""
 LEAST_BEYOND_MM, MOST_BEYOND_MM = 2.0, 15.0

@@ -153,6 +153,8 @@ def trust(handle: Any, k: int, reached: tuple[float, float, float], doubtful: bo
     """
     problem, at, report = handle.problem, handle.place[0], handle.report[0]
     ahead = abs(reached[0] - at.inserted)
+    if problem.friction.coefficient > 0.0:
+        ahead *= tol.HELD_CALM
     if report.pivot > tol.STIFF or at.calm >= tol.CALM_MM:
         at.calm += ahead
     if doubtful or report.pivot < tol.CRITICAL:

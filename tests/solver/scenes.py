@@ -7,8 +7,11 @@ from functools import cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.ndimage import gaussian_filter1d
+from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
 
-from solver import Grid, Insertion, Solution
+from solver import Grid, GuideWire, Insertion, Solution, VesselWall
 
 Array = NDArray[np.float64]
 Distance = Callable[[Array], Array]
@@ -107,3 +110,35 @@ def same_bits(a: Solution, b: Solution) -> None:
     for name, value in vars(a).items():
         other = getattr(b, name)
         assert np.array_equal(value, other) if isinstance(value, np.ndarray) else value == other, name
+
+
+def held_by_friction() -> tuple[GuideWire, VesselWall, float]:
+    """A vessel of random bends and widths, with friction 0.3, that holds a wire fast at 28 mm: wire, wall, roll."""
+    rng = np.random.default_rng([7, 133])
+    along, place, path = np.array([0.0, 0.0, 1.0]), np.array([0.0, 0.0, 3.0]), []
+    while 0.25 * len(path) < 45.0:
+        radius, axis = rng.uniform(3, 25), np.cross(along, rng.normal(size=3))
+        bend = Rotation.from_rotvec(axis / np.linalg.norm(axis) * 0.25 / radius)
+        steps = [bend] * int(rng.uniform(3, 1.6 * radius) / 0.25)
+        if rng.random() < 0.4:
+            steps += [Rotation.identity()] * int(rng.uniform(2, 8) / 0.25)
+        for turn in steps:
+            along = turn.apply(along)
+            place = place + 0.25 * along
+            path.append(place)
+    points = np.vstack([np.linspace([0.0, 0.0, -5.0], [0.0, 0.0, 3.0], 33), path])
+    wide = rng.uniform(0.7, 2.2) * (1.0 + 0.625 * gaussian_filter1d(rng.normal(size=len(points)), 12))
+    low = points.min(axis=0) - 4.0
+    axes = [np.arange(a, b, 0.5) for a, b in zip(low, points.max(axis=0) + 4.5, strict=True)]
+    nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+    near, which = cKDTree(points).query(nodes, k=8)
+    distance = (near - np.clip(wide, 0.45, 3.0)[which]).min(axis=-1)
+    rng.choice(4)  # of frictions
+    stiffness = 10 ** rng.uniform(-0.5, 2)
+    wall = VesselWall(Grid(distance, [0.5] * 3, low), stiffness, friction=0.3)
+    curve, tip = rng.uniform(0, 0.35), 10 ** rng.uniform(-1.5, 0.5)
+    knee, shaft = (10.0, 15.0)[rng.choice(2)], 10 ** rng.uniform(0.3, 1.5)
+    bending = [[0.0, tip], [knee, tip], [knee if rng.random() < 0.5 else knee + 15, shaft]]
+    torsion = np.inf if rng.random() < 0.6 else 10 ** rng.uniform(0, 1.3)
+    rest = [[0.0, curve], [7.0, curve], [7.0 if rng.random() < 0.5 else 12.0, 0.0]]
+    return GuideWire(0.5, 0.18, bending, rest, float(torsion)), wall, float(rng.uniform(0, 360))
