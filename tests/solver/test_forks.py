@@ -63,7 +63,9 @@ def test_steps_of_any_length_tell_of_the_fork() -> None:
 
 def test_friction_hides_no_fork() -> None:
     rubbing, plain = (list(into_fork(0.0, friction=mu).to_depths(DEPTHS)) for mu in (1e-9, 0.0))
-    assert told(rubbing)[0] == told(plain)[0]
+    first = told(plain)[0]
+    assert first
+    assert told(rubbing)[0][: len(first)] == first  # with friction a doubt lasts longer
     # the look at the other side leaves the wire, its loads and what it holds on to as they were
     for one, other in zip(rubbing, plain, strict=True):
         np.testing.assert_allclose(np.abs(one.joints_mm), np.abs(other.joints_mm), rtol=0.0, atol=1e-4)
