@@ -34,7 +34,7 @@ print(before, loaded())
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("warm")
-    assert main(["synth", "bend", "-o", str(folder / "study"), "--frames", "1", "--size", "80", "--seed", "4"]) == 0
+    assert main(["synth", "bend", "-o", str(folder / "study"), "--frames", "2", "--size", "80", "--seed", "4"]) == 0
     return folder
 
 
