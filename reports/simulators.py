@@ -25,11 +25,12 @@ _MOST_SHARED = 0.75
 def render_simulators(out_dir: Path, embed: bool = False) -> Path:
     """Draw the figure and write simulators.html; returns its path. embed : pictures and numbers into the page."""
     files = SimulatorFiles(*(read_if_there(out_dir / table.file, table) for table in (SIMULATORS, WHERE)))
-    warnings = {name: warnings_in(folder) for name, folder in folders_in(out_dir).items()}
+    places = folders_in(out_dir)
+    warnings = {name: warnings_in(folder) for name, folder in places.items()}
     copied = {name: said for name, own in warnings.items() if (said := copied_from_traces(own))}
     table, columns = _one_table(files.simulators, copied)
     grid = _content.grid(table, columns, bad=_doubtful(table, copied), nothing=_content.NOTHING)
-    folders = {name: folders_in(out_dir)[name] for name in table["simulator"]}
+    folders = {name: places[name] for name in table["simulator"]}
     links = {name: quote((folder / "index.html").relative_to(out_dir).as_posix()) for name, folder in folders.items()}
     for row, name in zip(grid["rows"], table["simulator"], strict=True):
         row["cells"][0]["link"] = links[name]
@@ -39,7 +40,7 @@ def render_simulators(out_dir: Path, embed: bool = False) -> Path:
     page = {
         "title": "Simulators side by side - wireval",
         "names": list(folders),
-        "first": next(iter(warnings)),
+        "first": next(iter(places)),
         "said": [
             {"name": name, "link": links[name]}
             | _said(alone[name], folder, alien[name], copied.get(name, ""), few=name in few)

@@ -44,13 +44,8 @@ def check_way(work: Workspace, here: Goal, there: Goal) -> None:
         way = f"from {here.depth:g} mm, {here.roll:g} degrees to {there.depth:g} mm, {there.roll:g} degrees"
         steps = f"steps of {work.introducer.step:g} mm and {work.introducer.turn:g} degrees {way}"
         allowed = f"at most {tol.LONGEST_WAY:g} joints to lay out, all steps together"
-        refuse(
-            "insertion",
-            "step_mm",
-            Found(steps),
-            allowed,
-            "longer steps (with friction 0.1 mm at most) or segments, or depths in several calls",
-        )
+        do = "longer steps (with friction 0.1 mm at most) or segments, or depths in several calls"
+        refuse("insertion", "step_mm", Found(steps), allowed, do)
 
 
 def advance(work: Workspace, here: Goal, there: Goal) -> tuple[Status, int]:

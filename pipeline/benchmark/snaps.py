@@ -34,9 +34,9 @@ def against_short_steps(seed: int, count: int, first: int = 0) -> Iterator[Claim
         default, plain = _pushed(scene), _pushed(scene, finest_mm=np.inf)
         for mine, before, true in zip(default, plain, short, strict=True):
             if mine.converged and true.converged:
-                apart.append(_apart(mine, true))
+                apart.append(apart_mm(mine, true))
                 flagged.append(mine.uncertain)
-                plain_apart.append(_apart(before, true))
+                plain_apart.append(apart_mm(before, true))
         ways = (partial(_pushed, scene), partial(_pushed, scene, finest_mm=np.inf))
         seconds.append(np.min([[timed(way, 1)[0] for way in ways] for _ in range(ROUNDS)], axis=0))
     yield from _claims(np.array(apart), np.array(flagged), np.array(plain_apart), np.array(seconds))
@@ -68,7 +68,7 @@ def _pushed(scene: Scene, step_mm: float = 1.0, finest_mm: float = SHORT_MM) -> 
     return list(insertion.to_depths(np.arange(1.0, int(plan.length_mm) + 1), roll_deg=plan.rolls[0]))
 
 
-def _apart(one: Solution, other: Solution) -> float:
+def apart_mm(one: Solution, other: Solution) -> float:
     """Largest distance of a joint, mm; inf at another depth."""
     if one.joints_mm.shape != other.joints_mm.shape:
         return np.inf

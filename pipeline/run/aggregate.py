@@ -14,7 +14,7 @@ import pandas as pd
 
 from pipeline.run.another import copies, with_another
 from pipeline.run.exchanged import exchanged
-from pipeline.run.overall import found_cases, frames_of, overall, shared_scans, strangers, validation
+from pipeline.run.overall import Found, found_cases, frames_of, overall, shared_scans, strangers, validation
 from pipeline.run.results import Result, write_json
 from reports import tables
 from reports.case_files import GOOD, doubted, not_reached
@@ -57,9 +57,7 @@ def aggregate(out: Path, run_info: dict[str, Any] | None = None, name: str = "ru
     cases, mixed = found_cases(out), mixed_settings(out)
     among = [] if mixed else with_another(out, cases)
     found, whole = [case.result for case in cases], {} if mixed else overall(among)
-    doubts = doubted(out)
-    if run_info is not None:
-        doubts = [*run_info.get("doubts", ()), *copies(validation(among)), *exchanged(out, validation(among))]
+    doubts = doubted(out) if run_info is None else _doubts(out, validation(among), run_info)
     if whole:
         whole["warnings"] += len(doubts)
     rows, (times, replayed_s) = [result.summary for result in found], _times(out, found)
@@ -92,6 +90,11 @@ def aggregate(out: Path, run_info: dict[str, Any] | None = None, name: str = "ru
         bool(mixed),
         frames_fitted=sum(row.get("frames_fitted") or 0 for row in rows),
     )
+
+
+def _doubts(out: Path, scored: Sequence[Found], run_info: Mapping[str, Any]) -> list[str]:
+    """What a run found doubtful among its cases: before it began, and among those that are scored."""
+    return [*run_info.get("doubts", ()), *copies(scored), *exchanged(out, scored)]
 
 
 def _times(out: Path, found: Sequence[Result]) -> tuple[pd.DataFrame, float]:

@@ -101,9 +101,9 @@ def misfit(fit: Calibration) -> list[str]:
     ]
 
 
-THINNEST_VOXELS = 0.48
-FLATTENING_VOXELS = 0.9
-"""Diameter of a wire in voxels below which its curved tip is traced too flat."""
+THINNEST_VOXELS, FLATTENING_VOXELS = 0.48, 0.9
+"""Diameters of a wire in voxels: the thinnest that was measured, and that below which its curved tip is traced too
+flat."""
 
 
 def _thickness(found: Gathered) -> dict[str, float]:

@@ -67,10 +67,12 @@ def oddity(
     # one that only just passes, too, explains nothing
     near = 0.5 * AT_ENTRY_MM
     for name, other in readings:
+        if _misplaced(other, entry_mm, direction, near):
+            continue
         # what lies behind the entry's plane is in the introducer, and no part of a depth
         length_mm = float(arc_length(begun(other, entry_mm, direction))[-1])
         scaled = not np.isclose(arc_length(other)[-1], arc_length(points_mm)[-1])
-        if not _misplaced(other, entry_mm, direction, near) and not (scaled and _far_from(depth_mm, length_mm)):
+        if not (scaled and _far_from(depth_mm, length_mm)):
             return f"{wrong}: it would if it were {name}"
     return f"{wrong}; check its coordinates"
 

@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 import solver.insertion
-from pipeline.benchmark.snaps import SHORT_MM, _apart
+from pipeline.benchmark.snaps import SHORT_MM, apart_mm
 from pipeline.benchmark.stress.axes import moderate
 from pipeline.benchmark.stress.plan import entry
 from pipeline.benchmark.stress.scene_run import build
@@ -46,7 +46,7 @@ def main() -> None:
         found = [pushed(given.seed, index, longest) for index in range(given.scenes)]
         took = time.process_time() - clock
         pairs = [pair for mine, true in zip(found, short, strict=True) for pair in zip(mine, true, strict=True)]
-        rest = [(one, _apart(one, other)) for one, other in pairs if one.converged and other.converged]
+        rest = [(one, apart_mm(one, other)) for one, other in pairs if one.converged and other.converged]
         off = [mm for one, mm in rest if mm > OFF_MM and not one.uncertain]
         flagged = np.mean([one.uncertain for one, _ in rest])
         said = f"steps of {longest:g} mm: {len(off)} of {len(rest)} depths are over {OFF_MM} mm off and not uncertain, "
