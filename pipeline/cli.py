@@ -5,9 +5,7 @@ import importlib
 import re
 import signal
 import sys
-import threading
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NoReturn
 
@@ -16,6 +14,7 @@ import shtab
 from pipeline import one_thread
 from pipeline.commands import VERBS, complain, unwritable
 from pipeline.commands.summaries import remove_summaries
+from pipeline.ended import Terminated, ended_by_signal
 from pipeline.status import InputError, StageError, did_you_mean
 from pipeline.streams import lasting
 from reports.atomic import WriteError
@@ -23,10 +22,6 @@ from reports.texts import UnreadableError, status_of
 
 OK, FAILED, BAD_INPUT = 0, 1, 2
 COMMAND_LINE = "the command line"
-
-
-class Terminated(KeyboardInterrupt):
-    """SIGTERM, which a batch system sends before it kills; handled like Ctrl-C."""
 
 
 KINDS = {"int": "a whole number", "float": "a number"}
@@ -128,23 +123,6 @@ def carried_out(args: argparse.Namespace) -> int:
     return int(importlib.import_module(f"pipeline.commands.{args.command}").main(args))
 
 
-@contextmanager
-def _ended_by_signal() -> Iterator[None]:
-    """Let SIGTERM end a command as Ctrl-C does: its workers are ended, finished results are kept."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-
-    def end(number: int, frame: object) -> None:
-        raise Terminated
-
-    before = signal.signal(signal.SIGTERM, end)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)
-
-
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code; a reader that closes the output pipe early does not change it."""
     with lasting() as out:
@@ -168,7 +146,7 @@ def _main(argv: Sequence[str] | None) -> int:
             return OK
         if not args.command:
             return BAD_INPUT
-        with _ended_by_signal():
+        with ended_by_signal():
             return carried_out(args)
     except (InputError, StageError, UnreadableError) as error:
         told = error if isinstance(error, InputError) else InputError([str(error)])

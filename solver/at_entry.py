@@ -13,7 +13,7 @@ from solver.solution import Solution
 from solver.wall import VesselWall
 
 AROUND = 512
-"""Points around the hull where it is sampled: so many more than its own that no roll changes what is held (to 1e-7)."""
+"""Points around the hull where it is sampled: so many more than its own that no roll changes what is held (to 1e-5)."""
 
 
 class EntryContact:

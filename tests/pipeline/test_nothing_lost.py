@@ -8,6 +8,8 @@ import os
 import re
 import shutil
 import signal
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Callable
@@ -387,6 +389,23 @@ def test_an_executor_that_is_not_there_is_refused(
 ) -> None:
     assert run(study, tmp_path / "out", "--executor", "nonsense://") == 2
     assert "--executor 'nonsense://': expected the address" in capsys.readouterr().err
+
+
+AT_A_FORK = """
+import os, signal, sys
+from pipeline.cli import main
+os.register_at_fork(after_in_parent=lambda: os.kill(os.getpid(), int(sys.argv[1])))
+sys.exit(main(["synth", "straight", "-o", sys.argv[2], "--size", "72", "--insertions", "2", "-j", "2"]))
+"""
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_signal_that_comes_while_python_forks_is_not_lost(tmp_path: Path, number: signal.Signals, code: int) -> None:
+    """Python prints the exception of a signal that it handles there, and goes on: the study was made to its end."""
+    words = [sys.executable, "-c", AT_A_FORK, str(int(number)), str(tmp_path / "study")]
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert done.returncode == code, done.stderr
+    assert "Exception ignored" not in done.stderr
 
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])

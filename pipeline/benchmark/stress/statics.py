@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from solver import GuideWire, VesselWall
+from solver.at_entry import AROUND
 
 Array = NDArray[np.float64]
 
@@ -85,7 +86,8 @@ class StaticChain:
     def _at_clamp(self, node: Array, frame: Array) -> tuple[Array, float]:
         """Force and energy of the wall on the half segment that is held; a sampled hull is a whole circle there."""
         assert self.wall is not None
-        angle = np.linspace(0.0, 2 * np.pi, 720, endpoint=False)[:, None]
+        # as many as the solver's: where the hull just touches, other points change what is held by 4e-6 of it
+        angle = np.linspace(0.0, 2 * np.pi, AROUND, endpoint=False)[:, None]
         ring = np.cos(angle) * frame[:, 0] + np.sin(angle) * frame[:, 1]
         points, reach = (node + self.wire.radius_mm * ring, 0.0) if self.wall.samples else (node, self.wire.radius_mm)
         phi, gradient, _ = self.wall.look_up(points)
