@@ -55,6 +55,11 @@ class SearchRegion:
         return voxels_of(self.runs[:: max(1, len(self.runs) // 2000)])
 
     @cached_property
+    def inner(self) -> NDArray[np.int64]:
+        """Flat indices of all voxels that are more than a voxel inside the wall."""
+        return np.flatnonzero(self.box.values < -float(np.min(self.box.spacing_mm)))
+
+    @cached_property
     def greys(self) -> Spare:
         """Memory on the box for a frame's grey: 0 off the runs, on them whatever an earlier frame left."""
         return Spare(self.box.shape, np.float32)

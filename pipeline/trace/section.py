@@ -4,6 +4,8 @@ The second harmonic of grey on a ring about the axis is nothing for a round wire
 for two that are 2.7 voxels apart; in contact it is 0.06, twice as bright.
 """
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -30,12 +32,15 @@ SURE = 2.0
 
 def carried(tangents: Array) -> tuple[Array, Array]:
     """Two unit normals (n, 3) each, along a curve with these unit tangents (n, 3), that twist as little as possible."""
-    first = np.empty_like(tangents)
-    normal = np.cross(tangents[0], np.eye(3)[int(np.argmin(np.abs(tangents[0])))])
-    for n, t in enumerate(tangents):
-        normal = normal - (normal @ t) * t
-        normal = normal / np.linalg.norm(normal)
-        first[n] = normal
+    x, y, z = np.cross(tangents[0], np.eye(3)[int(np.argmin(np.abs(tangents[0])))]).tolist()
+    normals = []
+    for a, b, c in tangents.tolist():  # arrays of three numbers take five times as long
+        along = x * a + y * b + z * c
+        x, y, z = x - along * a, y - along * b, z - along * c
+        size = math.sqrt(x * x + y * y + z * z)
+        x, y, z = x / size, y / size, z / size
+        normals.append((x, y, z))
+    first = np.array(normals)
     return first, np.cross(tangents, first)
 
 

@@ -10,12 +10,12 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.special import ndtr
 
+from pipeline.arrays.grids import unflattened
 from pipeline.arrays.jets import gaussian_taps, smooth_voxels
 from pipeline.model import Array, Curve, arc_length
 from pipeline.status import FrameStatus
 from pipeline.trace.attempt import dense, tube_length
 from pipeline.trace.profile import BAND_VOXELS, INDEPENDENT_VOXELS, LEAST_LEVEL, UNEVEN, Steps
-from pipeline.trace.region import voxels_of
 from pipeline.trace.subtraction import CREST_VOXELS, Subtraction
 from pipeline.trace.tube import Tube
 from pipeline.trace.verdict import note_of
@@ -59,16 +59,15 @@ def _marks_beyond(image: Subtraction, tube: Tube, line: Array) -> Array:
     A band of 1 mm that lies behind a stretch that nobody sees is too short to be found as a crest.
     """
     h, blur = image.voxel, MARK_BLUR * image.voxel
-    voxels = voxels_of(image.region.runs)
-    at = tuple(voxels.T)
     levels = tube.steps.levels
     # a mark is held against the wire's body, which a coil of platinum outshines
     least = MARK_SHARE * tube.peak * min(1.0, float(levels[levels > LEAST_LEVEL].min(initial=1.0)))
-    voxels = voxels[(image.grey[at] > least) & (image.region.box.values[at] < -h)]
-    flat = np.ravel_multi_index(tuple(voxels.T), image.grey.shape)
+    flat = image.region.inner
+    flat = flat[image.grey.reshape(-1)[flat] > least]
     seen = smooth_voxels(image.grey, gaussian_taps(MARK_BLUR), flat)
     least *= tube.sigma**2 / (tube.sigma**2 + blur**2)
-    found = voxels[seen > max(least, MARK_SIGMAS * image.noise_in(MARK_BLUR))] * image.spacing
+    bright = flat[seen > max(least, MARK_SIGMAS * image.noise_in(MARK_BLUR))]
+    found = unflattened(bright, image.grey.shape) * image.spacing
     if not len(found):
         return np.zeros((0, 3))
     away, nearest = cKDTree(line).query(found)
