@@ -120,6 +120,8 @@ def results_in(out_dir: Path) -> dict[str, dict[str, Any]]:
     return found
 
 
+DOUBTS = "doubts.json"
+"""What ``wireval report`` found doubtful among all cases of a folder: shards have not seen each other's."""
 MADE_FROM_TRACES = "only wires that were made from the traces"
 """What a warning of wires that lie nearer to the traces than these are known says; their errors are none."""
 
@@ -187,17 +189,6 @@ def manifests_in(runs: Iterable[Mapping[str, Any]]) -> list[str]:
     return list(dict.fromkeys(str(run["manifest_sha256"])[:12] for run in runs if "manifest_sha256" in run))
 
 
-def manifests_sentence(out_dir: Path) -> str:
-    """That the runs into a folder were of several manifests, which may state one wire otherwise; empty where of one."""
-    found = manifests_in(_runs(out_dir))
-    if len(found) < 2:
-        return ""
-    return (
-        f"the runs into this folder were of {len(found)} manifests ({', '.join(found)}): where these state wires, "
-        "walls or entries otherwise, numbers over all cases are of no one study"
-    )
-
-
 def left_out_sentence(out_dir: Path) -> str:
     """Cases without a result that no run into a folder was to compute, since ``--only`` named others."""
     names = listed([name for name, asked in _without_result(out_dir).items() if not asked])
@@ -210,7 +201,7 @@ def _without_result(out_dir: Path) -> dict[str, bool]:
     A shard names all cases and leaves out what ``--only`` left out of all of them: what it left to others is asked.
     """
     named: dict[str, bool] = {}
-    for run in _runs(out_dir):
+    for run in runs_in(out_dir):
         left_out = run.get("left_out") or ()
         for name in map(str, run.get("planned") or ()):
             named[name] = named.get(name, False) or name not in left_out
@@ -230,17 +221,18 @@ def counted(count: int, noun: str) -> str:
 
 def not_reached(out_dir: Path) -> str:
     """Why nothing is scored where every run into a folder was to end before frames are compared; else empty."""
-    ends = [str(run.get("until", "")) for run in _runs(out_dir)]
+    ends = [str(run.get("until", "")) for run in runs_in(out_dir)]
     early = bool(ends) and all(end in ("load", "segment", "trace", "simulate") for end in ends)
     return f"Nothing is scored: the run was to end before frames are compared (--until {ends[0]})." if early else ""
 
 
 def doubted(out_dir: Path) -> list[str]:
-    """What the runs into a folder found doubtful among their cases, each sentence once."""
-    return list(dict.fromkeys(str(text) for run in _runs(out_dir) for text in run.get("doubts", ())))
+    """What the runs into a folder found doubtful among their cases, and ``report`` among all, each sentence once."""
+    told = [*runs_in(out_dir), read_json(out_dir / DOUBTS)]
+    return list(dict.fromkeys(str(text) for run in told for text in run.get("doubts", ())))
 
 
-def _runs(out_dir: Path) -> list[dict[str, Any]]:
+def runs_in(out_dir: Path) -> list[dict[str, Any]]:
     """What the runs into a folder say of themselves; nothing where that is damaged, which ``wireval run`` refuses."""
     try:
         return [read_json(path) for path in sorted(out_dir.glob("run*.json"))]
@@ -250,7 +242,7 @@ def _runs(out_dir: Path) -> list[dict[str, Any]]:
 
 def _folders(out_dir: Path, named: bool) -> list[Path]:
     """Runs name all cases of their manifest. What does not (golden tables, an older run) is taken to name every one."""
-    planned = [run.get("planned") for run in _runs(out_dir)]
+    planned = [run.get("planned") for run in runs_in(out_dir)]
     names = None if not planned or None in planned else {name for ids in planned for name in ids or ()}
     found = sorted(p for p in (out_dir / "cases").glob("*") if p.is_dir())
     return [p for p in found if (names is None or p.name in names) == named]

@@ -19,7 +19,6 @@ from reports.case_files import (
     find_cases,
     left_out_sentence,
     left_over_sentence,
-    manifests_sentence,
     not_reached,
     not_run,
     not_run_sentence,
@@ -29,7 +28,7 @@ from reports.case_files import (
 from reports.counts import scans
 from reports.figures import RunFiles, declared
 from reports.listing import listed_files, listed_view
-from reports.origin import mixed_settings
+from reports.origin import of_no_one_study
 from reports.page import Each, begun_first, draw_sections, longest, one_by_one, section, write_page
 from reports.records import read_json
 from reports.schema import ERRORS, FAILURES, OVERALL_FILE, SIMULATORS, SUMMARY, SWEEP
@@ -107,7 +106,7 @@ def render_index(out_dir: Path, embed: bool = False, each: Each = one_by_one) ->
     row = dict(whole.iloc[0]) if len(whole) else {}
     uncounted = damaged | set(summary["case"][summary["role"] == "calibration"])
     missing = not_run(out_dir)
-    mixed, cases_said = mixed_settings(out_dir), zip(summary["role"], summary["status"], strict=True)
+    mixed, cases_said = of_no_one_study(out_dir), zip(summary["role"], summary["status"], strict=True)
     why_none = mixed or unscored(cases_said) or not_reached(out_dir)
     page = {
         **_headline(cases, _status(out_dir, [f for f in failures if not _of_another(f)], mixed), row, missing, damaged),
@@ -235,7 +234,7 @@ def _status(out_dir: Path, failures: Sequence[Any], mixed: str) -> str:
     """The worst that can be said of a run in a word or two."""
     if failures:
         return "failures"
-    return "cases missing" if not_run(out_dir) else "settings differ" if mixed else "ok"
+    return "cases missing" if not_run(out_dir) else "not pooled" if mixed else "ok"
 
 
 def _worse_cases(summary: pd.DataFrame, links: Mapping[str, str]) -> dict[str, Any]:
@@ -245,9 +244,8 @@ def _worse_cases(summary: pd.DataFrame, links: Mapping[str, str]) -> dict[str, A
 
 
 def _not_counted(out_dir: Path) -> dict[str, str]:
-    """Cases that no number of the page is over, and that those which one is over may not belong together."""
+    """Cases that no number of the page is over."""
     said = {"left_over": left_over_sentence, "not_run": not_run_sentence, "left_out": left_out_sentence}
-    said |= {"manifests": manifests_sentence}
     return {name: sentence(out_dir) for name, sentence in said.items()}
 
 

@@ -3,11 +3,11 @@
 Each case says it of itself: a folder may hold cases that were run at different times.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from reports.case_files import listed, manifests_in, results_in
+from reports.case_files import listed, manifests_in, results_in, runs_in
 from reports.records import read_json
 
 CODE = {"wireval": "wireval", "git_commit": "commit", "git_dirty": "changed files", "python": "Python"}
@@ -48,8 +48,14 @@ def told_alike(before: Path, after: Path) -> str:
     return "nothing differs in settings, code and inputs"
 
 
-def mixed_settings(*outs: Path) -> str:
-    """Why nothing may be pooled over the cases of output folders: their settings differ; empty where they do not."""
+def of_no_one_study(*outs: Path) -> str:
+    """Why nothing may be pooled over the cases of output folders: they are of different settings, or of manifests that
+    state them otherwise; empty where neither is so.
+    """
+    return _of_other_settings(outs) or _of_other_manifests(outs)
+
+
+def _of_other_settings(outs: Sequence[Path]) -> str:
     made = {
         f"{out.name}: {case}" if len(outs) > 1 else case: _made(result)
         for out in outs
@@ -62,6 +68,21 @@ def mixed_settings(*outs: Path) -> str:
     more = f" and {len(apart) - 1} more" * (len(apart) > 1)
     what = f"Nothing is pooled: the cases were run with different settings ({apart[0]}{more})"
     return f"{what}; run all of them with the same ones, or keep them in folders of their own."
+
+
+def _of_other_manifests(outs: Sequence[Path]) -> str:
+    """The sentence on cases that a run into their folder states otherwise than the run that computed them."""
+    found: set[str] = set()
+    for out in outs:
+        results = results_in(out)
+        for run in runs_in(out):
+            stated = {name: text for name, text in run.get("stated", {}).items() if results.get(name, {}).get("stated")}
+            found |= {name for name, text in stated.items() if results[name]["stated"] != text}
+    if not found:
+        return ""
+    what = f"Nothing is pooled: {listed(sorted(found))} was computed from another manifest, which stated it otherwise"
+    what = what if len(found) == 1 else what.replace(" was ", " were ").replace(" it ", " them ")
+    return f"{what} than a run into this folder; run all cases of one manifest, or keep them in folders of their own."
 
 
 def settings_of(result: Mapping[str, Any]) -> Told:

@@ -75,16 +75,10 @@ def _all_there(out: Path, found: Sequence["Result"], name: str = "") -> bool:
 
     found : results of which those that are damaged are still to be said, too.
     """
-    from reports.case_files import (
-        find_cases,
-        left_out_sentence,
-        left_over_sentence,
-        manifests_sentence,
-        not_run_sentence,
-    )
+    from reports.case_files import find_cases, left_out_sentence, left_over_sentence, not_run_sentence
 
     missing = not_run_sentence(out) or f"no case below {out}" * (not find_cases(out))
-    for aside in filter(None, (manifests_sentence(out), left_over_sentence(out), left_out_sentence(out), missing)):
+    for aside in filter(None, (left_over_sentence(out), left_out_sentence(out), missing)):
         sys.stderr.write(f"{name}{aside}\n")
     _tell([(r.case, str(r.failures[0]["message"])) for r in found if r.status == "damaged"], name)
     return not missing

@@ -14,12 +14,12 @@ import pandas as pd
 
 from pipeline.run.another import copies, with_another
 from pipeline.run.exchanged import exchanged
-from pipeline.run.overall import Found, found_cases, frames_of, overall, shared_scans, strangers, validation
+from pipeline.run.overall import found_cases, frames_of, overall, shared_scans, strangers, validation
 from pipeline.run.results import Result, write_json
 from reports import tables
-from reports.case_files import GOOD, doubted, not_reached
+from reports.case_files import DOUBTS, GOOD, doubted, not_reached
 from reports.junit import Outcome, write_junit
-from reports.origin import mixed_settings
+from reports.origin import of_no_one_study
 from reports.schema import FAILURES, OVERALL_FILE, SUMMARY, TIMINGS
 from reports.verdict import unscored
 
@@ -28,9 +28,9 @@ from reports.verdict import unscored
 class Totals:
     """The numbers of the last line. Errors are those of all points of the frames that are pooled, as in overall.csv.
 
-    unscored : why there are no errors.     mixed : whether the reason is that settings differ.     sweep_lost : cases
-    that crashed at a point of a sweep; they are not counted in ``cases``.     frames_fitted : scans that a roll was
-    fitted on; they are not counted in ``frames``.
+    unscored : why there are no errors.     mixed : whether the reason is that settings or manifests differ.
+    sweep_lost : cases that crashed at a point of a sweep; they are not counted in ``cases``.
+    frames_fitted : scans that a roll was fitted on; they are not counted in ``frames``.
     """
 
     cases: int
@@ -54,10 +54,13 @@ class Totals:
 
 def aggregate(out: Path, run_info: dict[str, Any] | None = None, name: str = "run.json") -> Totals:
     """Write the tables over all cases found, and ``name`` where ``run_info`` is given."""
-    cases, mixed = found_cases(out), mixed_settings(out)
+    cases, mixed = found_cases(out), of_no_one_study(out)
     among = [] if mixed else with_another(out, cases)
     found, whole = [case.result for case in cases], {} if mixed else overall(among)
-    doubts = doubted(out) if run_info is None else _doubts(out, validation(among), run_info)
+    among_all = [*copies(scored := validation(among)), *exchanged(out, scored)]
+    if run_info is None:  # shards have not seen each other's cases
+        write_json(out / DOUBTS, {"doubts": among_all})
+    doubts = doubted(out) if run_info is None else [*run_info.get("doubts", ()), *among_all]
     if whole:
         whole["warnings"] += len(doubts)
     rows, (times, replayed_s) = [result.summary for result in found], _times(out, found)
@@ -90,11 +93,6 @@ def aggregate(out: Path, run_info: dict[str, Any] | None = None, name: str = "ru
         bool(mixed),
         frames_fitted=sum(row.get("frames_fitted") or 0 for row in rows),
     )
-
-
-def _doubts(out: Path, scored: Sequence[Found], run_info: Mapping[str, Any]) -> list[str]:
-    """What a run found doubtful among its cases: before it began, and among those that are scored."""
-    return [*run_info.get("doubts", ()), *copies(scored), *exchanged(out, scored)]
 
 
 def _times(out: Path, found: Sequence[Result]) -> tuple[pd.DataFrame, float]:

@@ -74,23 +74,26 @@ def contents_of(files: Sequence[Mapping[str, Any]]) -> str:
 def other_file(case: Case, known: Sequence[Mapping[str, Any]]) -> str:
     """Which file of a case is not the one that ``known`` describes, its key and path; empty where all are.
 
-    A large file in the same place, of the same size, is taken for the same; elsewhere it is hashed.
+    A large file in the same place, of the same size and not written to since, is the same; any other is hashed.
     """
     rows = {str(row.get("key")): row for row in known}
     for key, path in _named(case).items():
         if not path.exists():
             continue
         row, size = rows.get(key, {}), _size(path)
-        here = row.get("path") == str(path) and row.get("bytes") == size and size > SMALL_BYTES
-        if not here and row.get("sha256") != file_hash(path):
+        here = (str(path), size, _changed_ns(path)) == (row.get("path"), row.get("bytes"), row.get("changed_ns"))
+        if not (here and size > SMALL_BYTES) and row.get("sha256") != file_hash(path):
             return f"{key}, now {path}"
     return ""
 
 
 def described(case: Case) -> list[dict[str, Any]]:
-    """Every input file of a case, once: its key in the manifest, path, hash and size."""
+    """Every input file of a case, once: its key in the manifest, path, hash, size and time of the last change."""
     named = {path: key for key, path in reversed(_named(case).items()) if path.exists()}
-    return [{"key": key, "path": str(p), "sha256": file_hash(p), "bytes": _size(p)} for p, key in named.items()][::-1]
+    return [
+        {"key": key, "path": str(p), "sha256": file_hash(p), "bytes": _size(p), "changed_ns": _changed_ns(p)}
+        for p, key in named.items()
+    ][::-1]
 
 
 def _named(case: Case) -> dict[str, Path]:
@@ -113,6 +116,12 @@ def _state(path: Path) -> State | None:
     except OSError:
         return None
     return stat.st_size, stat.st_mtime_ns, stat.st_ino
+
+
+def _changed_ns(path: Path) -> int:
+    """When a file, or any in a folder, was last written to, in nanoseconds."""
+    files = (path, *(path.rglob("*") if path.is_dir() else parts_of(path)))
+    return max((file.stat().st_mtime_ns for file in files if file.exists()), default=0)
 
 
 def _size(path: Path) -> int:

@@ -15,8 +15,8 @@ from pipeline.run.provenance import command_line
 from pipeline.run.results import Result, found_results
 from pipeline.run.sweep import heads_of, lost_points
 from reports.alike import alike
-from reports.case_files import counted, left_over_sentence, manifests_sentence
-from reports.origin import mixed_settings
+from reports.case_files import counted, left_over_sentence
+from reports.origin import of_no_one_study
 from reports.schema import SWEEP
 from reports.sweep import silent_points
 from reports.tables import read_if_there
@@ -30,7 +30,7 @@ def failure_lines(plan: Plan, then: str = "") -> list[str]:
     then : what comes next, where it is not the run's own command for these cases.
     """
     found, cases = found_results(plan.out), []
-    lines = [*filter(None, [mixed_settings(plan.out)]), *shared_scans(found)]
+    lines = [*filter(None, [of_no_one_study(plan.out)]), *shared_scans(found)]
     for result in found:
         cases += [row["case"] for row in result.failures]
         lines += map(_failure, alike(result.failures))
@@ -39,7 +39,7 @@ def failure_lines(plan: Plan, then: str = "") -> list[str]:
     lines += silent_points(read_if_there(plan.out / SWEEP.file, SWEEP))
     then = then or _next(plan, cases)
     worse = worse_sentence([{**result.summary, "role": result.role} for result in found])
-    aside = [*filter(None, [manifests_sentence(plan.out), left_over_sentence(plan.out), worse])]
+    aside = [*filter(None, [left_over_sentence(plan.out), worse])]
     return [*aside, *lines, f"next: {then}"] if cases else [*aside, *lines]
 
 

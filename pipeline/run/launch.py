@@ -21,6 +21,7 @@ from pipeline.run.batch import run_all
 from pipeline.run.cache import Store, forget_lumen
 from pipeline.run.case import Job, clear, each_on, finished, run_case
 from pipeline.run.hashing import file_hash
+from pipeline.run.inputs import stated
 from pipeline.run.log import last_stage
 from pipeline.run.occupied import owner_of
 from pipeline.run.outcome import Outcome
@@ -35,9 +36,14 @@ from pipeline.study.manifest import Case, Manifest
 from pipeline.study.same_scans import continued
 from pipeline.study.settings import to_toml
 from reports.atomic import WriteError, remove_leftovers, write_text, writing
-from reports.case_files import counted, left_over
+from reports.case_files import DOUBTS, counted, left_over
 from reports.html import render_index
 from reports.records import read_json
+from reports.schema import FAILURES, OVERALL_FILE, SUMMARY, TIMINGS
+
+OVER_ALL = SUMMARY.file, OVERALL_FILE, FAILURES.file, TIMINGS.file, DOUBTS, "index.html", "summary.pdf"
+"""Files over all cases. They go before the first case is computed: a run that is ended would leave those of an earlier
+one, all ok, beside cases of its own."""
 
 
 @dataclass(frozen=True)
@@ -145,6 +151,7 @@ def launch(plan: Plan) -> tuple[Totals, Path]:
     info: dict[str, Any] = {"manifest": str(manifest), "manifest_sha256": file_hash(manifest)}
     heads = heads_of(settings, plan.cases, plan.points)
     info |= {"sweep": heads, "swept": sorted(plan.ids) if heads else [], "until": plan.template.until}
+    info |= {"stated": {case.id: stated(case) for case in plan.manifest.cases}}
     info |= {"planned": [case.id for case in plan.manifest.cases], "doubts": continued(plan.manifest.cases)}
     name = f"run.{plan.shard.replace('/', '-')}.json" if plan.shard else "run.json"
     info |= {"left_out": _never_asked(out / name, plan.left_out), "config": settings.as_dict()}
@@ -155,6 +162,8 @@ def launch(plan: Plan) -> tuple[Totals, Path]:
     except WriteError as error:
         raise UsageError([str(error)]) from error
     remove_leftovers(out)
+    for earlier in OVER_ALL:
+        (out / earlier).unlink(missing_ok=True)
     if plan.template.fresh:
         _remove_others(out, info["manifest_sha256"])
     elif not plan.shard and not plan.left_out:
@@ -163,7 +172,6 @@ def launch(plan: Plan) -> tuple[Totals, Path]:
     run_cases(plan, [*plan.jobs, *plan.sweep_jobs])
     if removed := write_sweep(out, found_heads(out)):  # points of other shards so far included
         sys.stderr.write(f"{removed}\n")
-    (out / "summary.pdf").unlink(missing_ok=True)  # of an earlier result
     info |= {"provenance": code_state(), "assumptions": plan.assumptions}
     Store(plan.template.cache).trim()
     totals = replace(aggregate(out, info, name), sweep_lost=len(lost_points(out, heads, plan.ids)))

@@ -1,5 +1,6 @@
 """What a run left in its folder, as pandas frames."""
 
+import math
 import warnings
 from collections.abc import Sequence, Sized
 from dataclasses import dataclass, replace
@@ -9,11 +10,11 @@ from typing import NoReturn
 import pandas as pd
 
 from pipeline.run.gate import gate
-from pipeline.run.results import found_results
+from pipeline.run.results import Result, found_results
 from pipeline.status import InputError, did_you_mean
 from reports import tables
-from reports.case_files import CaseFiles, amiss, find_cases, not_run, read_case
-from reports.origin import mixed_settings
+from reports.case_files import CaseFiles, amiss, find_cases, listed, not_run, read_case
+from reports.origin import of_no_one_study
 from reports.schema import ERRORS, FAILURES, OVERALL_FILE, POINTS, SUMMARY, SWEEP, Table
 
 _SHOWN = ["case", "status", "frames", "frames_ok", "rms_mm", "tip_median_mm", "skill_strongest", "strongest_null"]
@@ -35,7 +36,7 @@ class Results:
     of all cases.     failures : what is not ok, and why.     sweep : a row for each value of a sweep.
     cases : each case's folder, read: ``results.cases["run1"].read_frame(3).simulated_mm``.     closed : a sentence for
     each ``fail_if`` of the run that holds.     damaged : cases whose files are not as they were written; their errors
-    and points are left out.
+    and points are left out.     other_tables : a sentence where summary.csv is not of the cases beside it.
     """
 
     out: Path
@@ -47,6 +48,7 @@ class Results:
     cases: Cases
     closed: tuple[str, ...] = ()
     damaged: tuple[str, ...] = ()
+    other_tables: str = ""
 
     @property
     def ok(self) -> bool:
@@ -56,10 +58,11 @@ class Results:
         if (
             self.closed
             or self.damaged
+            or self.other_tables
             or not len(self.summary)
             or len(self.failures)
             or not_run(self.out)
-            or mixed_settings(self.out)
+            or of_no_one_study(self.out)
         ):
             return False
         return not any(amiss(case.folder) for case in self.cases.values())
@@ -96,10 +99,38 @@ def read_results(out: str | Path) -> Results:
         raise InputError([str(error)]) from None
     if not cases:
         raise InputError([f"{out}: no cases below it; give a folder that `wireval run` wrote"])
-    damaged = {one.case: one.failures[0]["message"] for one in found_results(out) if one.status == "damaged"}
+    results = found_results(out)
+    damaged = {one.case: one.failures[0]["message"] for one in results if one.status == "damaged"}
     for message in damaged.values():
         warnings.warn(f"{message}; its errors are left out", stacklevel=2)
-    return _results(out, cases, tuple(damaged))
+    found = _results(out, cases, tuple(damaged))
+    return replace(found, other_tables=_told_of_others(found, [one for one in results if one.status != "damaged"]))
+
+
+def _told_of_others(found: Results, results: Sequence[Result]) -> str:
+    """Warn of tables over all cases that are not of these cases, as those of one shard of several: the warning."""
+    rows = {str(row["case"]): row for row in found.summary.to_dict("records")}
+    known = {one.case: one.summary for one in results}
+    asked = "frames_ok", "rms_mm"
+    apart = sorted(
+        name
+        for name in (rows.keys() | known.keys()) - set(found.damaged)
+        if name not in rows
+        or name not in known
+        or any(not _same(rows[name].get(key), known[name].get(key)) for key in asked)
+    )
+    if not rows or not apart:
+        return ""
+    said = f"{found.out}: summary.csv and overall.csv are not of the cases beside them ({listed(apart)})"
+    warnings.warn(f"{said}; `wireval report {found.out}` writes them anew", stacklevel=3)
+    return said
+
+
+def _same(one: float | None, other: float | None) -> bool:
+    """Whether two numbers are the same as far as a table has them, or both none."""
+    if one is None or other is None or math.isnan(one) or math.isnan(other):
+        return (one is None or math.isnan(one)) == (other is None or math.isnan(other))
+    return math.isclose(one, other, rel_tol=1e-6)
 
 
 def read_run(out: Path, gates: Sequence[str] = ()) -> Results:

@@ -11,7 +11,9 @@ import pytest
 
 import wireval
 from pipeline.cli import main
-from reports.origin import mixed_settings, what_differs
+from pipeline.run import aggregate, case, inputs
+from reports.case_files import doubted
+from reports.origin import of_no_one_study, what_differs
 from tests.pipeline.test_calibrate import PARAMETERS
 
 QUICK = ("--until", "load", "-q")
@@ -102,13 +104,13 @@ def test_shards_of_different_settings_are_not_pooled(
     assert said in capsys.readouterr().out
     page = (out / "index.html").read_text(encoding="utf-8")
     assert said in page
-    assert "settings differ" in page
+    assert "not pooled" in page
     assert pd.read_csv(out / "overall.csv").empty
     assert not wireval.read_results(out).ok
     main(["run", str(study), "-o", str(tmp_path / "3"), "--until", "compare", "-q", "--shard", "1/2", *FINE])
     shutil.copytree(tmp_path / "3", out, dirs_exist_ok=True)
     assert main(["report", *words]) == 0
-    assert mixed_settings(out) == ""
+    assert of_no_one_study(out) == ""
     assert len(pd.read_csv(out / "overall.csv")) == 1
 
 
@@ -120,7 +122,7 @@ def test_shards_that_ended_at_different_stages_are_not_pooled(study: Path, tmp_p
         assert main([*words, "--until", until]) == 0
         shutil.copytree(tmp_path / shard[0], out, dirs_exist_ok=True)
     assert main(["report", str(out), "--overview"]) == 1
-    assert "(--until simulate in a; compare in b)" in mixed_settings(out)
+    assert "(--until simulate in a; compare in b)" in of_no_one_study(out)
 
 
 def test_a_shard_that_was_not_merged_is_missed(study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -164,7 +166,7 @@ def test_a_result_that_cannot_be_read_says_nothing_of_settings(study: Path, tmp_
     run(study, tmp_path / "out")
     path = tmp_path / "out" / "cases" / "a" / "result.json"
     path.write_text(json.dumps([1]), encoding="utf-8")
-    assert mixed_settings(tmp_path / "out") == ""
+    assert of_no_one_study(tmp_path / "out") == ""
 
 
 def test_what_is_missing_is_no_ok_anywhere(study: Path, tmp_path: Path) -> None:
@@ -193,3 +195,98 @@ def test_what_is_missing_is_no_ok_anywhere(study: Path, tmp_path: Path) -> None:
     assert '<span class="status bad">cases missing</span>' in page
     assert "1 of 2 cases, 2 frames: 2 ok." in page
     assert not wireval.read_results(out).ok
+
+
+def with_a_thinner_wire(study: Path) -> None:
+    path = study / "manifest.toml"
+    text = path.read_text(encoding="utf-8")
+    assert "radius_mm = 0.18" in text
+    path.write_text(text.replace("radius_mm = 0.18", "radius_mm = 0.17"), encoding="utf-8")
+
+
+def test_shards_of_manifests_that_state_a_case_otherwise_are_not_pooled(
+    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A second wire, ten times as stiff, was pooled with the first, exit 0."""
+    out = tmp_path / "out"
+    run(study, tmp_path / "1", "--shard", "1/2")
+    with_a_thinner_wire(study)
+    run(study, tmp_path / "2", "--shard", "2/2")
+    for part in ("1", "2"):
+        shutil.copytree(tmp_path / part, out, dirs_exist_ok=True)
+    capsys.readouterr()
+    assert main(["report", str(out), "--overview"]) == 1
+    said = "Nothing is pooled: a, b were computed from another manifest, which stated them otherwise"
+    assert said in capsys.readouterr().out
+    assert said in (out / "index.html").read_text(encoding="utf-8")
+    assert not wireval.read_results(out).ok
+
+
+def test_a_run_that_was_ended_leaves_no_tables_of_an_earlier_one(
+    study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Another manifest's error over all cases stood beside one case that was computed anew, and `ok` was True."""
+    out, stages = tmp_path / "out", case.run_stages
+    run(study, out)
+    shutil.copytree(out, tmp_path / "before")
+    with_a_thinner_wire(study)
+
+    def ended(job: case.Job, *more: object) -> object:
+        if job.case.id == "b":
+            raise KeyboardInterrupt
+        return stages(job, *more)
+
+    monkeypatch.setattr(case, "run_stages", ended)
+    assert run(study, out, "--resume") == 130
+    (out / "cases" / "b").mkdir(exist_ok=True)
+    shutil.copytree(tmp_path / "before" / "cases" / "b", out / "cases" / "b", dirs_exist_ok=True)
+    with pytest.warns(UserWarning, match="the run into it has not ended"):
+        assert not wireval.read_results(out).ok
+    capsys.readouterr()
+    assert main(["report", str(out), "--overview"]) == 1
+    assert "Nothing is pooled: b was computed from another manifest" in capsys.readouterr().out
+
+
+def test_a_large_file_that_was_replaced_by_one_of_its_size_is_another(
+    study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A kept case was pooled beside it: files of more than 1 MiB were the same wherever the size was."""
+    monkeypatch.setattr(inputs, "SMALL_BYTES", 0)
+    out, frame = tmp_path / "out", study / "depth_1" / "recon.mha"
+    run(study, out)
+    assert run(study, out, "--only", "a") == 0
+    frame.write_bytes(frame.read_bytes()[:-1] + b"\1")
+    capsys.readouterr()
+    assert run(study, out, "--only", "a") == 2
+    assert "case 'b' would keep its result of another file: frames[1]" in capsys.readouterr().err
+
+
+def test_tables_of_one_shard_are_not_those_of_all(study: Path, tmp_path: Path) -> None:
+    """Merged and not yet reported, one case's error passed for that of both."""
+    out = tmp_path / "out"
+    for shard in ("1/2", "2/2"):
+        run(study, tmp_path / shard[0], "--shard", shard)
+        shutil.copytree(tmp_path / shard[0], out, dirs_exist_ok=True)
+    with pytest.warns(UserWarning, match=r"are not of the cases beside them \(a\)"):
+        found = wireval.read_results(out)
+    assert found.other_tables
+    assert not found.ok
+    main(["report", str(out), "--overview"])
+    assert not wireval.read_results(out).other_tables
+
+
+def test_what_is_doubtful_among_cases_of_several_shards_is_found_by_report(
+    study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One insertion, counted twice, was told by a run of all cases alone."""
+    alike = "insertions 'a' and 'b' are one scan"
+    monkeypatch.setattr(aggregate, "copies", lambda scored: [alike] * (len(scored) == 2))
+    out = tmp_path / "out"
+    for shard in ("1/2", "2/2"):
+        main(["run", str(study), "-o", str(tmp_path / shard[0]), "--until", "compare", "-q", "--shard", shard])
+        shutil.copytree(tmp_path / shard[0], out, dirs_exist_ok=True)
+    main(["report", str(out), "--overview"])
+    assert alike in doubted(out)
+    assert alike in (out / "index.html").read_text(encoding="utf-8").replace("&#39;", "'")
+    apart = sum(pd.read_csv(out / "summary.csv")["warnings"])
+    assert int(pd.read_csv(out / "overall.csv")["warnings"].item()) == apart + len(doubted(out))

@@ -300,7 +300,7 @@ def test_frames_whose_settings_differ_have_a_result(tmp_path: Path) -> None:
         path.write_text(json.dumps(json.loads(path.read_text(encoding="utf-8")) | config), encoding="utf-8")
     page = render_simulators(tmp_path).read_text(encoding="utf-8")
     assert "No frame of it has a result" not in page
-    assert '<span class="status bad">settings differ</span>' in page
+    assert '<span class="status bad">not pooled</span>' in page
 
 
 def test_a_simulator_without_any_usable_wire_is_shown(tmp_path: Path) -> None:
