@@ -1,5 +1,6 @@
 """The verdict on two runs, in words and tables."""
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -7,6 +8,7 @@ from typing import Any, Literal
 
 import pandas as pd
 
+from reports.case_files import doubted, warnings_in
 from reports.diff import Difference
 
 SHOWN = 30
@@ -18,6 +20,22 @@ NOT_JUDGED = "not judged"
 Judged = Literal["worse", "holds", "withheld"]
 
 
+def newly_warned(first: Path, second: Path) -> list[dict[str, str]]:
+    """Rows (case, warning) of what the second run is warned of and the first is not; the numbers in a text may differ.
+
+    None where the first run has no case that could say it, as golden tables have not.
+    """
+    known = warnings_in(first)
+    before = {_words(text) for texts in (doubted(first), *known.values()) for text in texts}
+    found = {"(all)": doubted(second)} | warnings_in(second)
+    rows = [{"case": case, "warning": text} for case, texts in found.items() for text in texts]
+    return [row for row in rows if _words(row["warning"]) not in before] if known else []
+
+
+def _words(text: str) -> str:
+    return re.sub(r"[-+]?\d[\d.e+-]*", "#", text)
+
+
 @dataclass(frozen=True, eq=False)
 class Verdict:
     """What became of a second run against a first one.
@@ -27,6 +45,8 @@ class Verdict:
     judged : worse where that closes the gate, holds, or withheld where there are too few insertions to tell.
     caveat : what the last line has to add, as that the two were not measured alike.
     alike : the sentence that nothing differs in where they come from; empty where something does.
+    warned : rows (case, warning) of what the second run alone is warned of.     void : why the second run's errors are
+    none that could be judged; empty where they are.
     """
 
     runs: tuple[Path, Path]
@@ -37,6 +57,8 @@ class Verdict:
     frames: Difference
     caveat: str = ""
     alike: str = ""
+    warned: Sequence[Mapping[str, str]] = ()
+    void: str = ""
 
     @property
     def closed(self) -> bool:
@@ -45,7 +67,9 @@ class Verdict:
 
     @property
     def word(self) -> str:
-        """worse, moved, not judged (no value was held against another) or not worse."""
+        """worse, moved, not judged (no value was held against another, or the second run's are void) or not worse."""
+        if self.void:
+            return NOT_JUDGED
         if self.judged == "worse" or len(self.frames.regressions):
             return "worse"
         if len(self.frames.moved):
@@ -56,6 +80,8 @@ class Verdict:
     def sentence(self) -> str:
         """The verdict in a line."""
         pooled = "; over all frames it is worse" * (self.judged == "worse") + f"; {self.caveat}" * bool(self.caveat)
+        if self.void:
+            return f"NOTHING WAS JUDGED: {self.void}"
         if self.word == NOT_JUDGED:
             return f"NOTHING WAS JUDGED: no error of the first run could be held against one of the second{pooled}"
         return f"{self.word.upper() if self.closed else self.word + ' than is allowed'}: {self.frames.sentence}{pooled}"
@@ -69,6 +95,7 @@ class Verdict:
             "What differs between the runs": pd.DataFrame(self.differs),
             "What became worse": self.frames.regressions.drop(columns="verdict"),
             "What moved, neither worse nor better": self.frames.moved.drop(columns="verdict"),
+            "What only the second run is warned of": pd.DataFrame(self.warned),
         }
         shown = {}
         for head, rows in lists.items():

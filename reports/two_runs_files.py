@@ -28,6 +28,7 @@ _HEADS = {
     "simulator": "whose wires they are",
     "what": "a setting, an input, the code",
     "column": "of overall.csv or errors.csv",
+    "warning": "what it is warned of; (all): of the cases together",
     "before": "in the first run",
     "after": "in the second run",
     "pairs": "frames that both runs have",
@@ -94,7 +95,8 @@ def _plain(verdict: Verdict) -> dict[str, Any]:
     first, second = map(str, verdict.runs)
     head = {"schema": 1, "closed": verdict.closed, "sentence": verdict.sentence, "paired": verdict.paired}
     head |= {"first": first, "second": second}
-    return head | {"differs": [*verdict.differs], "pooled": pooled, "regressions": worse, "moved": moved}
+    head |= {"differs": [*verdict.differs], "warned": [*verdict.warned]}
+    return head | {"pooled": pooled, "regressions": worse, "moved": moved}
 
 
 def _markdown(verdict: Verdict) -> str:

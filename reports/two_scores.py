@@ -37,6 +37,8 @@ def together(runs: tuple[Path, Path], parts: Mapping[str, Verdict], gone: list[s
         Difference(rows, empty),
         "; ".join(dict.fromkeys(part.caveat for part in parts.values() if part.caveat)),
         "; ".join(told) if all(told) and not lone else "",
+        [{"simulator": name, **row} for name, part in parts.items() for row in part.warned],
+        "; ".join(f"{name}: {part.void}" for name, part in parts.items() if part.void),
     )
 
 

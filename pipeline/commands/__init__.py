@@ -25,6 +25,12 @@ def add_settings(parser: argparse.ArgumentParser) -> None:
     add("--set", action="append", default=[], dest="settings", metavar="TABLE.KEY=VALUE", help="one setting")
 
 
+def add_gates(parser: argparse.ArgumentParser) -> None:
+    """--fail-if."""
+    says = "exit 1 where a number of overall.csv is so, or missing; >, <, >= or <=; may be repeated"
+    parser.add_argument("--fail-if", action="append", default=[], metavar="COLUMN>VALUE", help=says)
+
+
 def add_quiet(parser: argparse._ActionsContainer) -> None:
     """-q."""
     says = "print the result alone; warnings and failures to stderr"

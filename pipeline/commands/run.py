@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pipeline.commands import add_settings, add_verbosity, resolved_settings, say, settings_of
+from pipeline.commands import add_gates, add_settings, add_verbosity, resolved_settings, say, settings_of
 from pipeline.commands.given import INFERRED, add_calibrated, add_manifest, assumed_in, given
 
 if TYPE_CHECKING:
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 ADDRESS = re.compile(r"(\w+://)?[^/\s]+:\d+")
 """Of a scheduler; dask takes tcp:// where none is said."""
 
-GATES = "exit 1 where a number of overall.csv is so, or missing; >, <, >= or <=; may be repeated"
 HELP = "the whole pipeline: scans in, errors and a report out"
 
 
@@ -50,7 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--sweep", action="append", default=[], metavar="TABLE.KEY=V1,V2", help="also run with each of these values")
     add("--junit", type=Path, metavar="FILE", help="write a JUnit summary, one test per frame and gate")
     add_calibrated(parser)
-    add("--fail-if", action="append", default=[], metavar="COLUMN>VALUE", help=GATES)
+    add_gates(parser)
     add("--embed", action="store_true", help="put the pictures into the pages: one file a page")
     add("--no-cache", action="store_true", help="neither take lumens and traces of earlier runs nor keep them")
     add_verbosity(parser)

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pipeline.commands import add_quiet, add_settings, resolved_settings, say
+from pipeline.commands import add_gates, add_quiet, add_settings, resolved_settings, say
 from pipeline.commands.given import add_calibrated, file_of
 
 if TYPE_CHECKING:
@@ -35,13 +35,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_settings(parser)
     add("-j", "--jobs", type=int, default=1, metavar="N", help="cases at once (default 1)")
     add_calibrated(parser)
+    add_gates(parser)
     add("--fresh", action="store_true", help="compute every case again")
     add("--embed", action="store_true", help="put the pictures into the pages: one file a page")
     add_quiet(parser)
 
 
 def main(args: argparse.Namespace) -> int:
-    """Exit 0 all ok, 1 some case of any simulator failed; raises InputError where the input is wrong."""
+    """Exit 0 all ok, 1 some case of any simulator failed or a gate closed; InputError where the input is wrong."""
+    from pipeline.run.gate import gate
     from pipeline.run.last_words import failure_lines, last_line
     from pipeline.run.launch import launch
     from pipeline.run.simulators import side_by_side
@@ -50,6 +52,7 @@ def main(args: argparse.Namespace) -> int:
     from reports.inside import misleading_links
     from reports.verdict import OURS, remarks, warned
 
+    gates = [gate(text) for text in args.fail_if]
     plans = _plans(args)
     found = {name: check(plan.cases, plan.template.settings.config) for name, plan in plans.items()}
     theirs = [f"{name}: {text}" for name, of in found.items() for text in of if text not in found[OURS]]
@@ -57,7 +60,7 @@ def main(args: argparse.Namespace) -> int:
     if problems:
         raise InputError(problems)
     (args.out / "simulators").mkdir(parents=True, exist_ok=True)
-    done = {}
+    done, closed = {}, []
     for number, (name, plan) in enumerate(plans.items(), start=1):
         if not args.quiet:
             say(f"simulator {number} of {len(plans)}: {name}")
@@ -66,6 +69,7 @@ def main(args: argparse.Namespace) -> int:
         done[name] = (totals if name == OURS else replace(totals, solver_s=0.0)), page
         for line in failure_lines(plan, "see to what the messages name, then the same command again"):
             sys.stderr.write(f"{name}: {line}\n")
+        closed += [f"{name}: {why}" for why in (one.closed(totals.pooled) for one in gates) if why and name != OURS]
         say(f"{name}: {last_line(*done[name])}")
         for text in remarks(done[name][0].pooled, name):
             say(f"{name}: warning: {text}")
@@ -75,7 +79,8 @@ def main(args: argparse.Namespace) -> int:
     sys.stderr.writelines(f"{line}\n" for line in warnings if args.quiet)
     for line in side_by_side(args.out, {name: plan.out for name, plan in plans.items()}, args.embed):
         say(line)
-    return 0 if all(totals.all_ok for totals, _ in done.values()) else 1
+    sys.stderr.writelines(f"{line}\n" for line in closed)
+    return 0 if all(totals.all_ok for totals, _ in done.values()) and not closed else 1
 
 
 def said_once(said: Mapping[str, Sequence[str]]) -> list[str]:

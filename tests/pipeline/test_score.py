@@ -122,11 +122,13 @@ def test_own_wires_give_the_identical_table(tmp_path: Path) -> None:
     assert "straight-tip" in (out / "simulators.html").read_text(encoding="utf-8")
 
 
-def test_a_third_party_in_a_bifurcation(tmp_path: Path) -> None:
+def test_a_third_party_in_a_bifurcation(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     manifest, out = synth("bifurcation", tmp_path / "study"), tmp_path / "out"
-    assert (
-        main(["score", str(manifest), "--curves", f"PyElastica={PEERS / 'bifurcation'}", "-o", str(out), *QUICK]) == 0
-    )
+    words = ["score", str(manifest), "--curves", f"PyElastica={PEERS / 'bifurcation'}", "-o", str(out), *QUICK]
+    assert main(words) == 0
+    capsys.readouterr()
+    assert main([*words, "--fail-if", "rms_mm>0.001", "--fail-if", "frames_failed>0"]) == 1
+    assert "PyElastica: gate closed: --fail-if rms_mm>0.001" in capsys.readouterr().err
     table = pd.read_csv(out / "simulators.csv").set_index(["simulator", "against"])
     assert 0.8 < table.loc[("PyElastica", "wireval"), "rms_ratio"] < 1.5
     assert errors_of(out, "bifurcation")["branch_ok"].all()

@@ -14,6 +14,7 @@ from pipeline.cli import main
 from pipeline.run import ledger
 from pipeline.run.overall import Ratio
 from reports import tables
+from reports.case_files import MADE_FROM_TRACES
 from reports.junit import Outcome, write_junit
 from reports.origin import told_alike
 from reports.schema import ERRORS, POINTS, SIMULATORS
@@ -425,3 +426,33 @@ def test_a_message_with_control_characters_is_still_xml(tmp_path: Path) -> None:
     (suite,) = ET.parse(tmp_path / "x.xml").getroot()
     failure = suite[0][0]
     assert (suite.get("name"), failure.get("message"), failure.text) == ("ab[0m", "ok", "line\nnext")
+
+
+def warned(out: Path, *texts: str) -> None:
+    path = out / "cases" / "a" / "result.json"
+    result = json.loads(path.read_text(encoding="utf-8"))
+    path.write_text(json.dumps(result | {"warnings": [*texts]}), encoding="utf-8")
+
+
+def test_what_only_the_second_run_is_warned_of_is_told(first: Path, second: Path, tmp_path: Path) -> None:
+    """A gate stayed open over wires that were doubted, and not a word of it."""
+    before = shutil.copytree(first, tmp_path / "before")
+    warned(before, "the wall is 0.2 mm off")
+    warned(second, "the wall is 0.31 mm off", "the tip looks folded")
+    files = {name: tmp_path / f"diff.{name}" for name in ("json", "markdown", "html")}
+    words = [word for name, path in files.items() for word in (f"--{name}", str(path))]
+    assert main(["diff", str(before), str(second), *words]) == 0
+    texts = {name: path.read_text(encoding="utf-8") for name, path in files.items()}
+    assert json.loads(texts["json"])["warned"] == [{"case": "a", "warning": "the tip looks folded"}]
+    assert all("What only the second run is warned of" in texts[name] for name in ("markdown", "html"))
+    assert all("the tip looks folded" in text for text in texts.values())
+
+
+def test_wires_that_were_made_from_the_traces_pass_no_gate(
+    first: Path, second: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """They are nearer to the traces than any simulator can be: "not worse", exit 0."""
+    warned(second, f"0.001 mm: {MADE_FROM_TRACES}")
+    assert main(["diff", str(first), str(second), "--junit", str(tmp_path / "j.xml")]) == 1
+    assert f"NOTHING WAS JUDGED: a: 0.001 mm: {MADE_FROM_TRACES}" in capsys.readouterr().out
+    assert ET.parse(tmp_path / "j.xml").getroot().find(".//failure[@type='not_judged']") is not None
