@@ -81,7 +81,8 @@ def _with_room(run: Context, known: Known, frames: list[Frame]) -> Known:
     """The case with its frames, and a lumen that has room for their traces."""
     assert known.lumen is not None
     curves = [curve for frame in frames if (curve := frame.trusted_curve) is not None]
-    lumen = opened(known.lumen, curves, run.case.wire.radius_mm, given=run.case.lumen is not None)
+    wire, wall = run.case.wire, run.case.wall
+    lumen = opened(known.lumen, curves, wire.radius_mm, wall.stiffness_N_mm2, given=run.case.lumen is not None)
     run.log.warnings += lumen.warnings[len(known.lumen.warnings) :]
     run.lumen_known(lumen)
     return replace(known, frames=tuple(frames), lumen=lumen)
