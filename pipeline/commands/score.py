@@ -11,6 +11,7 @@ from pipeline.commands import add_gates, add_quiet, add_settings, resolved_setti
 from pipeline.commands.given import add_calibrated, file_of
 
 if TYPE_CHECKING:
+    from pipeline.run.aggregate import Totals
     from pipeline.run.launch import Plan
 
 HELP = "judge other simulators' wires by the same pipeline, side by side with the solver's own"
@@ -44,13 +45,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def main(args: argparse.Namespace) -> int:
     """Exit 0 all ok, 1 some case of any simulator failed or a gate closed; InputError where the input is wrong."""
     from pipeline.run.gate import gate
-    from pipeline.run.last_words import failure_lines, last_line
-    from pipeline.run.launch import launch
     from pipeline.run.simulators import side_by_side
     from pipeline.status import InputError
     from pipeline.study.check import check
     from reports.inside import misleading_links
-    from reports.verdict import OURS, remarks, warned
+    from reports.schema import SIMULATORS, WHERE
+    from reports.simulators import PAGE
+    from reports.verdict import OURS, warned
 
     gates = [gate(text) for text in args.fail_if]
     plans = _plans(args)
@@ -60,27 +61,39 @@ def main(args: argparse.Namespace) -> int:
     if problems:
         raise InputError(problems)
     (args.out / "simulators").mkdir(parents=True, exist_ok=True)
-    done, closed = {}, []
-    for number, (name, plan) in enumerate(plans.items(), start=1):
-        if not args.quiet:
-            say(f"simulator {number} of {len(plans)}: {name}")
-        totals, page = launch(plan)
-        # of wires that were handed in there is no time of a simulation
-        done[name] = (totals if name == OURS else replace(totals, solver_s=0.0)), page
-        for line in failure_lines(plan, "see to what the messages name, then the same command again"):
-            sys.stderr.write(f"{name}: {line}\n")
-        closed += [f"{name}: {why}" for why in (one.closed(totals.pooled) for one in gates) if why and name != OURS]
-        say(f"{name}: {last_line(*done[name])}")
-        for text in remarks(done[name][0].pooled, name):
-            say(f"{name}: warning: {text}")
+    for earlier in (SIMULATORS.file, WHERE.file, PAGE):  # a score that is ended would leave them
+        (args.out / earlier).unlink(missing_ok=True)
+    totals = _judged(plans, args.quiet)
     warnings = said_once({name: warned(plan.out) for name, plan in plans.items()})
     for line in warnings if not args.quiet else ():
         say(line)
     sys.stderr.writelines(f"{line}\n" for line in warnings if args.quiet)
     for line in side_by_side(args.out, {name: plan.out for name, plan in plans.items()}, args.embed):
         say(line)
+    closed = [f"{n}: {why}" for n in totals if n != OURS for g in gates if (why := g.closed(totals[n].pooled))]
     sys.stderr.writelines(f"{line}\n" for line in closed)
-    return 0 if all(totals.all_ok for totals, _ in done.values()) and not closed else 1
+    return 0 if all(one.all_ok for one in totals.values()) and not closed else 1
+
+
+def _judged(plans: "Mapping[str, Plan]", quiet: bool) -> "dict[str, Totals]":
+    """Run every simulator's plan, and say what became of it."""
+    from pipeline.run.last_words import failure_lines, last_line
+    from pipeline.run.launch import launch
+    from reports.verdict import OURS, remarks
+
+    done = {}
+    for number, (name, plan) in enumerate(plans.items(), start=1):
+        if not quiet:
+            say(f"simulator {number} of {len(plans)}: {name}")
+        totals, page = launch(plan)
+        # of wires that were handed in there is no time of a simulation
+        done[name] = totals if name == OURS else replace(totals, solver_s=0.0)
+        for line in failure_lines(plan, "see to what the messages name, then the same command again"):
+            sys.stderr.write(f"{name}: {line}\n")
+        say(f"{name}: {last_line(done[name], page)}")
+        for text in remarks(totals.pooled, name):
+            say(f"{name}: warning: {text}")
+    return done
 
 
 def said_once(said: Mapping[str, Sequence[str]]) -> list[str]:
