@@ -7,7 +7,7 @@ import numpy as np
 
 from pipeline.load import Header, read_header
 from pipeline.load.curves import read_truth
-from pipeline.model import Array, Wire, arc_length
+from pipeline.model import Array, OverWire, Wire, arc_length
 from pipeline.simulate.others import oddity
 from pipeline.study.manifest import Case
 from pipeline.study.same_scans import continued, shared
@@ -66,6 +66,22 @@ def _oddities(wire: Wire) -> Iterator[str]:
             f"bending_stiffness_N_mm2 is {tip:g} at the tip and {shaft:g} at its far end: guide wires are softest at "
             "the tip; profiles count from the tip, is it turned round?"
         )
+
+
+CATHETER_RADII_MM = (0.2, 2.0)
+"""Outer hulls of 1.2 to 12 French: from the end of a microcatheter to a guiding sheath."""
+
+
+def odd_catheter(catheter: OverWire | None) -> list[str]:
+    """Sentences where a catheter hardly can be one."""
+    return [] if catheter is None else [f"catheter {text}" for text in _of_catheter(catheter)]
+
+
+def _of_catheter(catheter: OverWire) -> Iterator[str]:
+    radius, (thinnest, thickest) = catheter.radius_mm, CATHETER_RADII_MM
+    if not thinnest <= radius <= thickest:
+        what = "is it in French (6 of them are a radius of 1 mm)?" if radius > thickest else "is it in another unit?"
+        yield f"radius_mm = {radius:g}: catheters have {thinnest:g} to {thickest:g} mm; {what}"
 
 
 SHORT_WAY = 0.5
@@ -198,7 +214,8 @@ def other_voxels(header: Header | None) -> list[str]:
 
 def in_case(case: Case, scan: Header | None) -> list[str]:
     """What is doubtful in a case beside its wire and its truth. scan : header of a scan of the case."""
-    return [*other_voxels(scan), *leads_out(case, scan), *odd_depths(case, scan), *wrapped_rolls(case)]
+    of_scan = [*other_voxels(scan), *leads_out(case, scan), *odd_depths(case, scan)]
+    return [*of_scan, *wrapped_rolls(case), *odd_catheter(case.catheter)]
 
 
 def doubts(cases: Sequence[Case], config: Config) -> Iterator[str]:

@@ -16,7 +16,15 @@ from pipeline.load.curves import read_truth
 from pipeline.load.order import natural_key
 from pipeline.model import Array
 from pipeline.study.manifest import ManifestError, read_manifest
-from pipeline.study.plausible import implausible, measured_otherwise, odd_depths, odd_truth, other_voxels, wrapped_rolls
+from pipeline.study.plausible import (
+    implausible,
+    in_case,
+    measured_otherwise,
+    odd_depths,
+    odd_truth,
+    other_voxels,
+    wrapped_rolls,
+)
 from pipeline.study.same_scans import continued
 from pipeline.study.settings import Config
 
@@ -171,6 +179,24 @@ def test_a_wire_in_another_unit_is_a_warning(tmp_path: Path, change: tuple[str, 
     text = GOOD.replace(*change).replace('wire = "soft"', 'wire = "soft"\ndown = [0, 0, 1]')
     notes = implausible(read_manifest(written(tmp_path, text)).cases)
     assert f"wire 'soft': {said}" in notes[0]
+
+
+CATHETERS: list[tuple[float, float, str]] = [
+    (50.0, 0.9, ""),
+    (50.0, 7.0, "catheter radius_mm = 7: catheters have 0.2 to 2 mm; is it in French"),
+]
+
+
+@pytest.mark.parametrize(("stiffness", "radius_mm", "said"), CATHETERS)
+def test_a_catheter_that_hardly_can_be_one_is_a_warning(
+    tmp_path: Path, stiffness: float, radius_mm: float, said: str
+) -> None:
+    """One of 7 mm radius was "no problem found"."""
+    keys = f"{{bending_stiffness_N_mm2 = {stiffness}, radius_mm = {radius_mm}, insertion_mm = 4}}"
+    (case,) = read_manifest(written(tmp_path, f"{GOOD}\ncatheter = {keys}\n")).cases
+    found = in_case(case, None)
+    assert len(found) == bool(said)
+    assert all(text.startswith(said) for text in found)
 
 
 @pytest.mark.parametrize(("depths", "said"), [("[0.014, 0.039]", 1), ("[14, 39]", 0), ("[1400, 3900]", 1)])

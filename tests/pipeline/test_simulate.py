@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from pipeline.cli import main
-from pipeline.model import Clamp, Lumen
+from pipeline.model import Clamp, Lumen, OverWire
+from pipeline.run.stages.covered import too_thick
 from pipeline.run.stages.known import Frame
 from pipeline.run.stages.load import each_frame
 from pipeline.run.stages.simulate import _pressed_deep, judged
@@ -198,6 +199,39 @@ def test_a_wire_that_lies_in_itself_says_so_and_fails_its_frame() -> None:
     assert wire.self_overlap_mm == pytest.approx(0.36, abs=0.01)
     assert judged(Frame(0, simulated=wire), wire, 0.18).status == "self_contact"
     assert next(Insertion(turned, None, [0, 0, 0], [0, 0, 1]).to_depths([6.0])).self_overlap_mm == 0.0
+
+
+@pytest.mark.parametrize("over_mm", [0.0, 12.0])
+def test_a_catheter_that_lies_in_itself_fails_its_frame(over_mm: float) -> None:
+    """A helix of 2 mm radius and turns 1.2 mm apart: the wire is free of itself, a catheter of 0.9 mm is not."""
+    turned = GuideWire(0.25, 0.18, 2.0, 0.5)
+    wire = next(Insertion(turned, None, [0, 0, 0], [0, 0, 1]).to_depths([20.0]))
+    arc = np.arange(0.0, 20.0, 0.25)
+    apart = np.stack([2.0 * np.cos(arc / 2.0), 2.0 * np.sin(arc / 2.0), 1.2 * arc / (4.0 * np.pi)], 1)
+    wire = replace(wire, joints_mm=apart)
+    said = judged(Frame(0, catheter_mm=over_mm), wire, 0.18, OverWire(50.0, 0.9, over_mm))
+    assert said.status == ("self_contact" if over_mm else "ok")
+    assert not over_mm or "the catheter of radius_mm = 0.9 lies 0." in said.message
+    assert judged(Frame(0, catheter_mm=over_mm), wire, 0.18, OverWire(50.0, 0.4, over_mm)).ok
+
+
+def test_a_catheter_thicker_than_the_vessel_is_told_where_it_is_inserted() -> None:
+    """One of 7 mm radius in a vessel of 1.6 mm was ok without a word. The tube is closed behind the entry."""
+    axes = [np.arange(a, b, 0.3) for a, b in ((-4, 4), (-4, 4), (-3, 24))]
+    x, y, z = np.meshgrid(*axes, indexing="ij")
+    distance = np.maximum(np.hypot(x, y) - 1.6, -0.2 - z)
+    wall = VesselWall(Grid(distance.astype(np.float32), np.full(3, 0.3), np.array([-4.0, -4.0, -3.0])), 2.0)
+    insertion = Insertion(GuideWire(0.5, 0.18, 20.0), wall, [1.2, 0, 0], [0, 0, 1.0])
+    wires = list(insertion.to_depths([10.0, 15.0]))
+    for radius, tips, frames in ((7.0, (8.0, 12.0), 2), (2.2, (0.0, 12.0), 1), (7.0, (0.0, 0.0), 0)):
+        seen = [Frame(n, catheter_mm=tip) for n, tip in enumerate(tips)]
+        said = too_thick(OverWire(50.0, radius, tips), seen, wires, wall)
+        assert len(said) == bool(frames)
+        assert not frames or f"{frames} frame" in said[0]
+        assert not frames or f"radius_mm = {radius:g}, and in frame " in said[0]
+        assert not frames or "the lumen has room for 1.4" in said[0]  # the middle lies between voxels of 0.3 mm
+    seen = [Frame(n, catheter_mm=8.0) for n in range(2)]
+    assert too_thick(OverWire(50.0, 1.5, 8.0), seen, wires, wall) == []
 
 
 def test_nothing_to_simulate_is_no_error() -> None:

@@ -6,10 +6,11 @@ from time import perf_counter
 
 import numpy as np
 
-from pipeline.model import Clamp
+from pipeline.model import Clamp, OverWire
 from pipeline.run.log import Log
 from pipeline.run.stages.clamp import clamp_of
 from pipeline.run.stages.clues import beside_clues, clues_of
+from pipeline.run.stages.covered import deep_in_itself_mm, too_thick
 from pipeline.run.stages.known import Context, Frame, Known
 from pipeline.run.stages.others import frames_of_others
 from pipeline.run.stages.roll import with_fitted_roll
@@ -68,8 +69,11 @@ def _replayed(run: Context, known: Known) -> Known:
     for frame, wire, num_mm in zip(replay, resolved.wires, resolved.num_mm, strict=True):
         log.warnings += [_told(frame.index, snap) for snap in wire.snaps]
         found = replace(frame, simulated=wire, num_mm=float(num_mm))
-        frames[frame.index] = judged(found, wire, case.wire.radius_mm)
+        frames[frame.index] = judged(found, wire, case.wire.radius_mm, case.catheter)
     log.warnings += _pressed_deep(replay, resolved.wires, case.wire.radius_mm)
+    if case.catheter is not None and known.lumen is not None:
+        wall = wall_of(known.lumen.distance, run.config.solver.hull)
+        log.warnings += too_thick(case.catheter, replay, resolved.wires, wall)
     return replace(known, frames=tuple(frames), segment_mm=resolved.segment_mm)
 
 
@@ -111,8 +115,8 @@ def _inserted(
     return list(_noted(part.log, frames, found, len(known.frames))), part.log
 
 
-def judged(frame: Frame, wire: Solution, radius_mm: float) -> Frame:
-    """The frame, failed where its wire is not at rest, cannot follow a bend or passes through itself."""
+def judged(frame: Frame, wire: Solution, radius_mm: float, catheter: OverWire | None = None) -> Frame:
+    """The frame, failed where its wire is not at rest, cannot follow a bend, or lies in itself, as its catheter may."""
     if not wire.converged:
         return frame.failed("simulate", wire.status)
     turn, overlap = wire.largest_turn_deg, wire.self_overlap_mm
@@ -120,6 +124,10 @@ def judged(frame: Frame, wire: Solution, radius_mm: float) -> Frame:
         return frame.failed("simulate", FrameStatus.UNDER_RESOLVED, f"a joint is turned by {turn:.0f} degrees")
     if overlap > MOST_OVERLAP_RADII * radius_mm:
         return frame.failed("simulate", FrameStatus.SELF_CONTACT, f"the wire lies {overlap:.2f} mm deep in itself")
+    overlap = deep_in_itself_mm(catheter, frame, wire)
+    if catheter is not None and overlap > MOST_OVERLAP_RADII * catheter.radius_mm:
+        what = f"the catheter of radius_mm = {catheter.radius_mm:g} lies {overlap:.2f} mm deep in itself"
+        return frame.failed("simulate", FrameStatus.SELF_CONTACT, what)
     return frame
 
 
