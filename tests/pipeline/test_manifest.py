@@ -171,6 +171,8 @@ def test_a_clamp_cannot_be_borrowed_from_nowhere_or_in_a_ring(tmp_path: Path) ->
             "rest_curvature_per_mm of 8.3 at the most: a be",
         ),
         (("[30.0, 5.0]]", "[30.0, 5.0]]\nweight_N_per_mm = 7e-3"), "weight_N_per_mm = 0.007: a rod of"),
+        (("[30.0, 5.0]]", "[30.0, 5.0]]\ntorsional_stiffness_N_mm2 = 5e-6"), "torsional_stiffness_N_mm2 = 5e-06 is 1e"),
+        (("[30.0, 5.0]]", "[30.0, 5.0]]\ntorsional_stiffness_N_mm2 = 5e6"), "torsional_stiffness_N_mm2 = 5e+06 is 1e"),
     ],
 )
 def test_a_wire_in_another_unit_is_a_warning(tmp_path: Path, change: tuple[str, str], said: str) -> None:
@@ -183,6 +185,11 @@ def test_a_wire_in_another_unit_is_a_warning(tmp_path: Path, change: tuple[str, 
 
 CATHETERS: list[tuple[float, float, str]] = [
     (50.0, 0.9, ""),
+    (0.0, 0.9, ""),
+    (3.0, 0.3, ""),
+    (5e3, 0.9, ""),
+    (20e-6, 0.9, "catheter bending_stiffness_N_mm2 = 2e-05: a tube of radius_mm = 0.9 has 1 (of soft silicone)"),
+    (20e6, 0.9, "catheter bending_stiffness_N_mm2 = 2e+07: a tube of radius_mm = 0.9 has 1 (of soft silicone)"),
     (50.0, 7.0, "catheter radius_mm = 7: catheters have 0.2 to 2 mm; is it in French"),
 ]
 
@@ -191,7 +198,7 @@ CATHETERS: list[tuple[float, float, str]] = [
 def test_a_catheter_that_hardly_can_be_one_is_a_warning(
     tmp_path: Path, stiffness: float, radius_mm: float, said: str
 ) -> None:
-    """One of 7 mm radius was "no problem found"."""
+    """One of 7 mm radius, and an EI in N m2, were "no problem found"."""
     keys = f"{{bending_stiffness_N_mm2 = {stiffness}, radius_mm = {radius_mm}, insertion_mm = 4}}"
     (case,) = read_manifest(written(tmp_path, f"{GOOD}\ncatheter = {keys}\n")).cases
     found = in_case(case, None)
@@ -224,6 +231,7 @@ def test_real_wires_are_no_warning(tmp_path: Path, radius_mm: float, modulus_gpa
     """Moduli measured by Harrison et al. 2011; the catalogue's own wires are softer."""
     stiffness = 1000.0 * modulus_gpa * math.pi * radius_mm**4 / 4.0
     text = GOOD.replace("0.18", str(radius_mm)).replace("[30.0, 5.0]", f"[30.0, {stiffness}]")
+    text = text.replace("\n[[case]]", f"\ntorsional_stiffness_N_mm2 = {stiffness / 1.3}\n[[case]]")
     assert implausible(read_manifest(written(tmp_path, text)).cases) == []
 
 
