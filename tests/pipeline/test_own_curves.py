@@ -16,7 +16,7 @@ from pipeline.cli import main
 from pipeline.model import Curve, arc_length
 from pipeline.run.stages.beside import beside_what_is_seen
 from pipeline.run.stages.known import Frame
-from pipeline.run.stages.own_curves import CORNER_VOXELS, LONGER, corner_mm, known_by_tip, zigzag
+from pipeline.run.stages.own_curves import CORNER_VOXELS, LONGER, corner_mm, known_by_tip, rough, zigzag
 from pipeline.trace.config import TraceConfig
 from tests.pipeline.known_study import MANIFEST, QUICK, Array, errors_of, peers, write_csv, write_study
 
@@ -90,6 +90,18 @@ def test_a_curve_of_few_points_is_warned_of(tmp_path: Path) -> None:
     dense = [CubicSpline(arc_length(p), p)(np.linspace(0, arc_length(p)[-1], 80)) for p in sparse]
     assert "few points" not in ran(tmp_path / "dense", dense)[1]
     assert corner_mm(dense[-1]) < CORNER_VOXELS * 0.3
+
+
+def test_the_coarsest_curve_is_named_as_well(tmp_path: Path) -> None:
+    """Without an inner point no corner told: of two points "check axes and the roll" was said, of four "few points"."""
+    ends = {n: wire[[0, -1]] for n, wire in enumerate(WIRES)}
+    (said,) = rough(ends, 0.3, "the simulated wires", "give more")
+    assert "the simulated wires have few points" in said
+    assert all(f"frame {n}: {np.linalg.norm(two[1] - two[0]):.1f} mm in one line" in said for n, two in ends.items())
+    begun_later = {0: WIRES[-1][[0, 1, -1]]}  # led back to the entry, or cut there
+    assert "mm in one line" in rough(begun_later, 0.3, "the true wires", "give more")[0]
+    assert rough({0: WIRES[-1][[0, 2]], 1: WIRES[-1][:1]}, 0.3, "the true wires", "give more") == []
+    assert "own curves have few points" in ran(tmp_path, [wire[[0, -1]] for wire in WIRES])[1]
 
 
 def test_a_curve_that_begins_beyond_the_entry_is_led_back_to_it(tmp_path: Path) -> None:

@@ -28,6 +28,8 @@ CHORD_MM, LONGER = 2.0, 0.02
 points that scatter by a tenth of their distance by 0.01."""
 CORNER_VOXELS = 0.25
 """How far beside a smooth curve the lines between points may pass: traces of scans are off by 0.03 to 0.11 voxel."""
+LONE, UNSEEN_RADIUS_MM = 0.9, 20.0
+"""Share of a curve's length from which a piece is all of it and nothing tells how it bends, and a bend it may have."""
 LEAST_BEND_MM = 0.01
 """By how much a curve that is not straight is longer than its chord: as 5 mm of a wire with a radius of 20 mm."""
 MOST_NAMED = 6
@@ -95,14 +97,29 @@ def _in_lumen(curve: Curve, distance: Grid) -> Curve:
 
 def rough(curves: Mapping[int, Array], voxel_mm: float, whose: str, mend: str) -> list[str]:
     """A warning of curves (n, 3), by frame, that cut the wire's corners. whose, mend : words for it."""
-    apart = {frame: corner_mm(points) for frame, points in curves.items()}
-    coarse = [f"frame {n}: {mm:.2f} mm" for n, mm in apart.items() if mm > CORNER_VOXELS * voxel_mm]
+    told = {frame: _cut(points, CORNER_VOXELS * voxel_mm) for frame, points in curves.items()}
+    coarse = [f"frame {n}: {text}" for n, text in told.items() if text]
     if not coarse:
         return []
     return [
         f"{whose} have few points: straight lines between them pass beside a smooth wire "
         f"({listed(coarse, MOST_NAMED)}; {CORNER_VOXELS * voxel_mm:.2f} mm would do): {mend}"
     ]
+
+
+def _cut(points_mm: Array, allowed_mm: float) -> str:
+    """By how much a curve (n, 3) cuts the wire's corners, in words; empty where that is no more than is allowed.
+
+    One straight line has no corner that could tell: it is judged by a bend that wires often have.
+    """
+    if len(points_mm) < 2:
+        return ""
+    steps = np.linalg.norm(np.diff(points_mm, axis=0), axis=1)
+    length, longest = float(steps.sum()), float(steps.max())
+    if longest > LONE * length:
+        return f"{length:.1f} mm in one line" if longest**2 / (8.0 * UNSEEN_RADIUS_MM) > allowed_mm else ""
+    mm = corner_mm(points_mm)
+    return f"{mm:.2f} mm" if mm > allowed_mm else ""
 
 
 def zigzag(points_mm: Array) -> float:
