@@ -11,7 +11,9 @@ from pipeline.status import UsageError, did_you_mean
 from reports.schema import OVERALL_FILE, SUMMARY
 
 RELATIONS = {"<=": operator.le, ">=": operator.ge, "<": operator.lt, ">": operator.gt}
-WRITTEN = re.compile(rf"\s*(\w+)\s*({'|'.join(RELATIONS)})\s*(\S+)\s*")
+NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
+"""As people write one: Python also takes 1_0 for 10, and digits of other scripts."""
+WRITTEN = re.compile(rf"\s*(\w+)\s*({'|'.join(RELATIONS)})\s*({NUMBER})\s*")
 
 
 @dataclass(frozen=True)
@@ -43,13 +45,11 @@ class Gate:
 def gate(text: str) -> Gate:
     """Parse ``column>number``; UsageError where it is malformed, or where the column is no number of overall.csv."""
     found = WRITTEN.fullmatch(text)
-    try:
-        column, relation, limit = found.groups() if found else ("", "", "")
-        number = float(limit)
-    except ValueError:
-        number = math.nan
+    column, relation, limit = found.groups() if found else ("", "", "nan")
+    number = float(limit)
     if not math.isfinite(number):
-        raise UsageError([f'--fail-if {text!r}: write a column of {OVERALL_FILE} and a limit, as in "rms_mm>0.5"'])
+        do = f'write a column of {OVERALL_FILE} and a limit in plain digits, as in "rms_mm>0.5" or "rms_mm>5e-1"'
+        raise UsageError([f"--fail-if {text!r}: {do}"])
     names = [one.name for one in SUMMARY if one.kind != "text"]
     if column not in names:
         raise UsageError([f"--fail-if {text!r}: no number {column!r} in {OVERALL_FILE}; {did_you_mean(column, names)}"])

@@ -218,10 +218,16 @@ class ManifestTables(Strict):
 
     @model_validator(mode="after")
     def _unique(self) -> "ManifestTables":
-        repeats = [name for name, count in Counter(case.id for case in self.case).items() if count > 1]
-        if repeats:
-            what = "this id is used more than once; ids name output folders"
-            raise saying(*(f"case {name!r}: {what}" for name in repeats))
+        counts = Counter(case.id for case in self.case)
+        what = "this id is used more than once; ids name output folders"
+        problems, taken = [f"case {name!r}: {what}" for name, count in counts.items() if count > 1], dict[str, str]()
+        for name in counts:
+            first = taken.setdefault(name.lower(), name)
+            if name != first:
+                what = f"this id differs from {first!r} by capital letters alone; rename one"
+                problems.append(f"case {name!r}: {what}: ids name output folders, which some disks do not tell apart")
+        if problems:
+            raise saying(*problems)
         return self
 
 

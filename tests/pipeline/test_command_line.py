@@ -69,6 +69,9 @@ TOO_LONG = (
         ("run STUDY -o y --fail-if rms_mm", "write a column"),
         ("run STUDY -o y --fail-if rms_mm>nan", "write a column"),
         ("run STUDY -o y --fail-if rms_mm>inf", "write a column"),
+        ("run STUDY -o y --fail-if rms_mm>1e999", "write a column"),
+        ("run STUDY -o y --fail-if max_mm>1_0", "a limit in plain digits, as in"),  # was taken for 10
+        ("run STUDY -o y --fail-if max_mm>\N{FULLWIDTH DIGIT ONE}", "a limit in plain digits, as in"),
         ("run STUDY -o y --fail-if case>1", "no number 'case'"),
         ("init STUDY", "is there already"),
         ("init STUDY/none", "no such folder"),
@@ -280,6 +283,8 @@ def test_what_settings_call_allowed_is_what_is_allowed() -> None:
 
 def test_a_gate_closes_on_the_limit_s_far_side_and_on_nothing_to_go_by() -> None:
     assert gate("rms_mm > 0.5") == Gate("rms_mm", ">", 0.5)
+    for text, limit in (("5e-1", 0.5), (".5", 0.5), ("-1.", -1.0), ("+1E3", 1e3)):
+        assert gate(f"skill>{text}") == Gate("skill", ">", limit)
     assert "rms_mm is 0.6" in gate("rms_mm>0.5").closed({"rms_mm": 0.6})
     assert not gate("rms_mm>0.5").closed({"rms_mm": 0.5})
     assert gate("rms_mm>=0.5").closed({"rms_mm": 0.5})

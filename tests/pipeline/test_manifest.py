@@ -132,6 +132,12 @@ def test_ids_are_unique(tmp_path: Path) -> None:
     assert "used more than once" in problems(tmp_path, twice)
 
 
+def test_ids_that_some_disks_do_not_tell_apart_are_refused(tmp_path: Path) -> None:
+    """`straight` and `Straight` passed check: on such a disk one result replaced the other."""
+    said = problems(tmp_path, GOOD + GOOD[GOOD.index("[[case]]") :].replace("run1", "Run1"))
+    assert "case 'Run1': this id differs from 'run1' by capital letters alone; rename one: ids name" in said
+
+
 def test_broken_toml_and_no_file(tmp_path: Path) -> None:
     assert "not valid TOML" in problems(tmp_path, "schema = = 1")
     with pytest.raises(ManifestError, match="no such manifest"):
