@@ -57,10 +57,8 @@ def aggregate(out: Path, run_info: dict[str, Any] | None = None, name: str = "ru
     cases, mixed = found_cases(out), of_no_one_study(out)
     among = [] if mixed else with_another(out, cases)
     found, whole = [case.result for case in cases], {} if mixed else overall(among)
-    among_all = [*copies(scored := validation(among)), *exchanged(out, scored)]
-    if run_info is None:  # shards have not seen each other's cases
-        write_json(out / DOUBTS, {"doubts": among_all})
-    doubts = doubted(out) if run_info is None else [*run_info.get("doubts", ()), *among_all]
+    seen = [*copies(scored := validation(among)), *exchanged(out, scored)]
+    doubts = _with_those_of_runs(out, seen) if run_info is None else [*run_info.get("doubts", ()), *seen]
     if whole:
         whole["warnings"] += len(doubts)
     rows, (times, replayed_s) = [result.summary for result in found], _times(out, found)
@@ -93,6 +91,14 @@ def aggregate(out: Path, run_info: dict[str, Any] | None = None, name: str = "ru
         bool(mixed),
         frames_fitted=sum(row.get("frames_fitted") or 0 for row in rows),
     )
+
+
+def _with_those_of_runs(out: Path, seen: Sequence[str]) -> list[str]:
+    """What runs have doubted, and what is seen among all cases: what no shard could see stands in a file of its own."""
+    (out / DOUBTS).unlink(missing_ok=True)
+    if unsaid := [text for text in seen if text not in doubted(out)]:
+        write_json(out / DOUBTS, {"doubts": unsaid})
+    return doubted(out)
 
 
 def _times(out: Path, found: Sequence[Result]) -> tuple[pd.DataFrame, float]:
