@@ -63,8 +63,8 @@ class Solution:
 
     joints_mm : (k + 1, 3) from the entry to the tip, read-only.
     frames : (k + 1, 3, 3), columns are material axes 1, 2 and the direction of the segment before the joint.
-    energy_N_mm : total, loads included (the wire's weight as seen from the entry); bending_energy_N_mm,
-    wall_energy_N_mm : its parts.
+    energy_N_mm : total, loads and weight included, as seen from the entry; bending_energy_N_mm, wall_energy_N_mm : its
+    parts.
     friction_energy_N_mm : lost to friction on the way from the depth before, over all steps; not in energy_N_mm.
     contact_force_N : (k + 1, 3), the wall's force on the wire at each joint.
     reaction_force_N : (3,), the introducer's force on the wire; reaction_torque_N_mm : its torque about the axis.

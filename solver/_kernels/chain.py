@@ -106,8 +106,7 @@ def lay_out(chain: Chain, table: WireTable, k: int, first_mm: float) -> None:
 def weigh(chain: Chain, weight: Any, k: int) -> None:
     """Add the wire's own weight, (3,) N/mm, to the loads: half of each segment's to either end, exact for a rigid one.
 
-    Node 0, which stays where it is, gets minus the sum of all others: so the energy is counted from the entry, and wire
-    that comes in there adds none.
+    Node 0, which stays where it is, gets none.
     """
     if weight[0] == 0.0 and weight[1] == 0.0 and weight[2] == 0.0:
         return
@@ -115,7 +114,6 @@ def weigh(chain: Chain, weight: Any, k: int) -> None:
         length = 0.5 * chain.length[n - 1] + (0.5 * chain.length[n] if n < k else 0.0)
         for a in range(3):
             chain.load[n, a] += length * weight[a]
-            chain.load[0, a] -= length * weight[a]
 
 
 @kernel

@@ -150,7 +150,7 @@ def iterate(problem: Problem, k: int, now: Any, tolerance: float, report: Any) -
         now.next_check += now.next_check // 4
         if settled(problem, now.slot, k, tolerance, report):
             return CONVERGED
-        noise = noise_of(problem, now.slot, scale_of(problem, now.slot, k))
+        noise = noise_of(problem, now.slot, k, scale_of(problem, now.slot, k))
         if not now.checked_energy - now.energy > noise:
             # a fifth of all sweeps so far lowered the energy by rounding alone
             return STALLED

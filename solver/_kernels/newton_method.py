@@ -178,7 +178,7 @@ def iterate(problem: Problem, k: int, now: Any, tolerance: float, report: Any) -
     counters.joints_left_still += now.first_free
     tolerance *= tol.SOFT_TOLERANCE if report.pivot < tol.SOFT else 1.0
     scale = scale_of(problem, now.slot, k)
-    noise = noise_of(problem, now.slot, scale)
+    noise = noise_of(problem, now.slot, k, scale)
     if now.first_free > 0 and not definite:
         now.first_free = 0
         return UNFINISHED

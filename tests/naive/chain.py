@@ -43,7 +43,7 @@ def energy(
     load: Array,
     law: Callable[[Array], Array] = hooke,
 ) -> float:
-    """Eq. 1-7 with half a weight at the tip, N mm."""
+    """Eq. 1-7 with half a weight at the tip, loads counted from the entry, N mm."""
     x = joints_of(controls, rest, length, base, entry)
     total = 0.5 * float(np.sum(bend * np.sum(controls[:, :2] ** 2, axis=1)))
     total += 0.5 * float(np.sum(twist[controls[:, 2] != 0] * controls[controls[:, 2] != 0, 2] ** 2))
@@ -51,7 +51,7 @@ def energy(
         weight = 0.5 * (length + np.append(length[1:], 0.0))
         depth = np.maximum(wall(x[1:]) + radius, 0.0)
         total += stiffness * float(np.sum(weight * law(depth)))
-    return total - float(np.sum(load * x))
+    return total - float(np.sum(load * (x - x[0])))
 
 
 def minimum(k: int, components: int, function: Callable[[Array], float], start: Array) -> tuple[Array, float]:

@@ -121,11 +121,11 @@ class StaticChain:
         return gradient, elastic
 
     def energy(self, nodes: Array, frames: Array) -> float:
-        """Total energy, N mm."""
+        """Total energy, N mm; the loads' is counted from the entry."""
         u = self.angles(frames)
         bending = 0.5 * float(np.sum(self.bend * (u[:, 0] ** 2 + u[:, 1] ** 2)))
         twisting = 0.5 * float(np.sum(self.twist * u[:, 2] ** 2))
-        return bending + self.contact(nodes, frames)[2] + twisting - float(np.sum(self.load * nodes))
+        return bending + self.contact(nodes, frames)[2] + twisting - float(np.sum(self.load * (nodes - nodes[0])))
 
 
 def assemble(

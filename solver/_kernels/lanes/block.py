@@ -81,7 +81,7 @@ SHAPES = (
 )
 """Shapes of a block's arrays, without the lanes: k joints, n nodes, p points; ``asked`` is not an array of lanes."""
 LANE = record(
-    *((name, float) for name in ("depth", "roll", "limit", "tolerance", "stiffest", "scale", "noise")),
+    *((name, float) for name in ("depth", "roll", "limit", "tolerance", "stiffest", "scale", "noise", "moved")),
     *((name, float) for name in ("accuracy", "pivot")),
     *((name, float) for name in ("fraction", "decrement", "before", "bending", "wall", "load", "energy")),
     *((name, np.int64) for name in ("phase", "goal", "k", "tries", "allowed", "outcome", "iterations", "used")),
@@ -89,8 +89,9 @@ LANE = record(
 )
 """Where a wire is.
 
-depth, roll : that its step leads to.     tolerance : see ``data.Limits``.     stiffest, scale, noise : see
-``energy.scale_of``.     fraction : of Newton's step to try.     decrement : the fall that its gains foretell.
+depth, roll : that its step leads to.     tolerance : see ``data.Limits``.     stiffest, scale, noise,
+moved : see ``energy.scale_of``, ``load_moved``.
+fraction : of Newton's step to try.     decrement : the fall that its gains foretell.
 before : energy that the iteration began with.     bending, wall, load : energies of the current state.
 limit, iterations : of this depth.     phase : see ``relax``.     goal : index of the depth that it is on its way
 to.     k : segments.     tries : step lengths that failed.     allowed : iterations of this relaxation.

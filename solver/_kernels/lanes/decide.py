@@ -53,7 +53,7 @@ def after_sweep(me: Any, now: Any, counters: Any, number: Any, lane: int) -> Non
     counters.joints_left_still += now.first_free
     me.before, me.tries, me.fraction = now.energy, 0, 1.0
     me.scale = me.bending + me.wall + FLOOR * me.stiffest
-    me.noise = tol.ROUND_OFF * (me.scale + abs(me.load))
+    me.noise = tol.ROUND_OFF * (me.scale + abs(me.load) + me.moved)
     if now.first_free > 0 and not definite:
         now.first_free = 0
         next_iteration(me, now)

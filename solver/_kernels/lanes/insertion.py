@@ -10,7 +10,7 @@ from solver import _tolerances as tol
 from solver._kernels import data
 from solver._kernels.bare import bare
 from solver._kernels.data import CURRENT, Problem
-from solver._kernels.energy import energy_of, stiffest
+from solver._kernels.energy import energy_of, load_moved, stiffest
 from solver._kernels.flags import kernel, merged, released
 from solver._kernels.forces import copy_state, forget_forces
 from solver._kernels.forks import back_again, turned_aside
@@ -169,6 +169,7 @@ def begin_relaxing(me: Any, now: Any, wire: Any, start: int, report: Any) -> boo
     finite = math.isfinite(now.energy)
     me.outcome = data.CONVERGED if finite else data.NON_FINITE
     me.stiffest, me.phase = stiffest(problem.chain, k), WAITING
+    me.moved = load_moved(problem.chain, problem.state.x[CURRENT], k)
     return finite and not resting
 
 

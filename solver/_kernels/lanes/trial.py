@@ -45,7 +45,7 @@ def rollout(b: Block, base: int, spacing: float) -> None:
     frame, at = load9(old_r, base), load3(old_x, base)
     store9(r, base, frame)
     store3(x, base, at)
-    energy, furthest = zero, zero
+    energy, furthest, entry = zero, zero, at
     for j in range(base, b.length.shape[0]):
         ahead, there, before = load9(old_r, j + 1), load3(old_x, j + 1), (old_u[j, 0], old_u[j, 1], zero)
         moved, turned = minus(at, load3(old_x, j)), relative(load9(old_r, j), frame)
@@ -63,7 +63,8 @@ def rollout(b: Block, base: int, spacing: float) -> None:
         energy = energy + 0.5 * b.bend[j] * (v[0] * v[0] + v[1] * v[1])
         way = minus(at, there)
         furthest = greater(furthest, dot(way, way))
-    b.number[BENDING], b.number[LOAD] = energy, -(b.load[0] * at[0] + b.load[1] * at[1] + b.load[2] * at[2])
+    # joint ``base`` is at the entry in every lane, see ``block.fill_up``
+    b.number[BENDING], b.number[LOAD] = energy, -dot((b.load[0], b.load[1], b.load[2]), minus(at, entry))
     b.number[JUMP] = select(furthest > 0.25 * spacing * spacing, 1.0, zero)
 
 
