@@ -22,7 +22,8 @@ class Catheter:
 
     bending_stiffness_N_mm2 : EI of the tube alone, 0 or more.     radius_mm : of its outer hull, more than the wire's.
     The pair bends by the sum of both EI; at rest it has the wire's curvature times its share of that sum. The two slide
-    and turn on each other freely.
+    and turn on each other freely: friction of the vessel on the catheter is borne by the catheter's hand, and not
+    modelled; the wire rubs on the vessel beyond the catheter's tip only.
     """
 
     bending_stiffness_N_mm2: float

@@ -152,8 +152,9 @@ class Workspace:
         k, points = (k, points) if coefficient else (-1, 0)
         held, arm, start, normal, stretch = np.zeros((5, points, 3))
         load, pressed = np.zeros((2, points))
-        frame = np.zeros((k + 1, 3, 3))
-        return data.Friction(coefficient, self.rule.reach, held, frame, arm, start, normal, load, stretch, pressed)
+        exposed, frame = np.ones(points), np.zeros((k + 1, 3, 3))
+        springs = held, frame, arm, start, normal, load, stretch, pressed
+        return data.Friction(coefficient, self.rule.reach, exposed, *springs)
 
     def _empty_chain(self, k: int, points: int) -> data.Chain:
         length, bend, twist, rest = np.zeros((4, k))

@@ -158,6 +158,7 @@ class Friction(NamedTuple):
     """Coulomb friction of one step as a potential, load and direction taken from the last relaxation.
 
     coefficient : 0 is no friction at all.     radius : of a smooth hull, mm, else 0.
+    exposed : (p,), share of the wire at each point that no catheter covers: what the wall bears beside it rubs.
     Before the step: held : (p, 3), where each point's spring is fixed to the wall, moved to the wire's axis, mm.
     frame : (k + 1, 3, 3) of the same material.     In the step: arm : (p, 3), from the point to where it rubs, mm, in
     the frame of its node.     start : (p, 3), where its spring is fixed, mm.     normal : (p, 3).     load : (p,) N.
@@ -166,6 +167,7 @@ class Friction(NamedTuple):
 
     coefficient: float
     radius: float
+    exposed: Any
     held: Any
     frame: Any
     arm: Any

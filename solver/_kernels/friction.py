@@ -4,6 +4,10 @@ A point in contact holds on to a point of the wall by a spring that slips at μ 
 elastoplasticity (Simo and Laursen, Comput. Struct. 42 (1992) 97). Where the hull is smooth the contact is on the hull,
 a radius from the axis along the wall's normal: rolling slips there and meets a torque. Load, normal and place of a
 contact are those of the last relaxation; ``minimise`` repeats until they no longer change.
+
+Where a catheter covers the wire the wall rubs on the catheter, which its own hand holds, and the wire slides in it: a
+contact there has no load (``exposed``), as one that left the wall. Covered, it lets go of its spring; uncovered, it
+holds on anew where it is.
 """
 
 import math
@@ -103,7 +107,7 @@ def take_loads(problem: Problem, slot: int, k: int, share: float) -> tuple[float
             if d != 0.0:
                 jet = state.jet[slot, p]
                 slope = math.sqrt(jet[1] * jet[1] + jet[2] * jet[2] + jet[3] * jet[3])
-                load = wall_law.force(problem.stiffness, chain.weight[p], d) * slope
+                load = wall_law.force(problem.stiffness, chain.weight[p], d) * slope * friction.exposed[p]
                 turned = hold(problem, frame, p, scaled(1.0 / max(slope, 1e-12), (jet[1], jet[2], jet[3])))
                 change = max(change, load * turned)
             change = max(change, abs(load - friction.load[p]))

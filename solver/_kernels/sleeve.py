@@ -6,7 +6,7 @@ the wire. Where a cell has the jump inside, its compliance is the sum of both pa
 
 from solver._kernels.algebra import load3
 from solver._kernels.chain import cell, integral, profile_at
-from solver._kernels.data import CURRENT, Chain, Problem, WireTable
+from solver._kernels.data import CURRENT, Chain, Friction, Problem, WireTable
 from solver._kernels.flags import kernel
 
 
@@ -43,6 +43,23 @@ def put_over(chain: Chain, table: WireTable, k: int) -> None:
         else:
             compliance, chain.rest[j] = sleeve.cells[k - j, 0], sleeve.cells[k - j, 1]
         chain.bend[j] = 1.0 / compliance
+
+
+@kernel
+def uncover(friction: Friction, chain: Chain, table: WireTable, k: int) -> None:
+    """Find the share of the wire at each look-up point that is beyond the catheter's tip: there alone it rubs.
+
+    By shares, since a point that stands for a whole segment would let go at once as the tip passes it.
+    """
+    if not table.sleeve.there:
+        return
+    tip, around, arc, depth = table.sleeve.tip[0], table.rule.hull.shape[0], 0.0, depth_of(chain, k)
+    for n in range(1, k + 1):
+        arc += chain.length[n - 1]
+        for p in range(chain.first[n], chain.first[n + 1]):
+            stands_for = around * chain.weight[p]
+            beyond = min(arc + chain.offset[p, 2] + 0.5 * stands_for, depth) - tip
+            friction.exposed[p] = min(max(beyond / stands_for, 0.0), 1.0)
 
 
 @kernel

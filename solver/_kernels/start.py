@@ -18,7 +18,7 @@ from solver._kernels.friction import anchor_friction
 from solver._kernels.joint import spin
 from solver._kernels.rollout import copy_base, place
 from solver._kernels.rotation import bend_to, bent, bent_to, with_twist
-from solver._kernels.sleeve import put_over
+from solver._kernels.sleeve import put_over, uncover
 
 
 @inlined
@@ -204,6 +204,7 @@ def lay_along(
     joints = (min(was, k) if lies and same_base(state.r) else 0, k)
     follow(state.x[source], count, chain, state.u[CURRENT], state.x[CURRENT], state.r[CURRENT], joints)
     if problem.friction.coefficient > 0.0:
+        uncover(problem.friction, chain, table, k)
         anchor_friction(problem, was, k, ahead, table.shaft)
 
 
