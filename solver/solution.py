@@ -73,8 +73,10 @@ class Solution:
     start_energy_N_mm : total energy that the last relaxation began with.
     least_pivot : distance to instability: the least pivot of a joint, which is its stiffness with all joints beyond it
     free to follow, over its own stiffness. 1 for a free wire, 0 where it snaps; below 0.5 it is soft, below 0.05 it
-    nearly gives way, or is free to turn about a round vessel's axis; a wall that holds it makes it more than 1. NaN
-    where ``relax`` ends in a state that is not at rest.
+    nearly gives way, or is free to turn about a round vessel's axis; a wall that holds it makes it more than 1. Where
+    torsion is finite the twist of shaft and wire counts as one joint more: 1/(1 - C dT/d(roll)) by its compliance C and
+    the hand's torque T, 0.5 where the tip turns twice as far as the hand, 0 where it whips. NaN where ``relax`` ends in
+    a state that is not at rest.
     dissipated_N_mm : the hand's work on the way to this depth minus the change of energy. The work is integrated by the
     trapezium rule over each step: where the push jumps (a jump of rest curvature or stiffness passes the entry) it is
     off by half the jump times the step, perhaps below 0. It includes friction_energy_N_mm.     snaps : on that way.

@@ -183,6 +183,21 @@ def least_curvature(q: Six, twisting: bool) -> float:
 
 
 @inlined
+def pivot_of(q: Six, least: float, bend: float, twist: float) -> float:
+    """Stiffness Q_uu of a joint over its own: of bending, or of twist with bending free to follow, whichever is less.
+
+    least : see ``least_curvature``.     bend, twist : the joint's own, N mm/rad; twist 0 where torsion is rigid. By
+    bending alone a wire that whips had a pivot of 1.003 a quarter of a degree before.
+    """
+    pivot = least / bend
+    if twist > 0.0 and least > 0.0:
+        det = q[0] * q[1] - q[3] * q[3]
+        taken = q[4] * q[4] * q[1] - 2 * q[3] * q[4] * q[5] + q[5] * q[5] * q[0]
+        pivot = min(pivot, (q[2] - taken / det) / twist)
+    return pivot
+
+
+@inlined
 def least_bending(q: Six) -> float:
     """Least eigenvalue of the bending block of Q_uu."""
     half = 0.5 * (q[0] - q[1])
@@ -210,6 +225,22 @@ def solve_block(q: Six, twisting: bool) -> Nine:
     c22 = q[0] * q[1] - q[3] * q[3]
     det = -(q[0] * c00 + q[3] * c01 + q[4] * c02)
     return full((c00 / det, c11 / det, c22 / det, c01 / det, c02 / det, c12 / det))
+
+
+@kernel
+def pivot_of_shaft(chain: Chain, k: int, stiffness: float) -> float:
+    """Pivot of the twist of the whole wire, as if it were one joint before all the rest.
+
+    stiffness : dT/d(roll) of the hand's torque T, N mm/rad. With a compliance C, rad/(N mm), before a rest whose own
+    is κ it is κ/(1 + κ C), so that the pivot 1 + κ C is 1/(1 - C dT/d(roll)). That of each joint by itself is near 0
+    in the last hundredth of a degree before a whip alone, the less the shorter the segments are.
+    """
+    compliance = 0.0
+    for j in range(k):
+        compliance += 1.0 / chain.twist[j]
+    share = stiffness * compliance
+    # a wire that is held on its way, not at its end, resists more than its whole length would
+    return 1.0 / (1.0 - share) if share < 1.0 else math.inf
 
 
 @kernel

@@ -44,6 +44,8 @@ from solver._kernels.blocks import (
     node_hessian,
     note_direction,
     note_pivot,
+    pivot_of,
+    pivot_of_shaft,
     solve_block,
     stiffened,
     store_gains,
@@ -134,7 +136,7 @@ def sweep(problem: Problem, slot: int, first_free: int, k: int, damping: float, 
             jac = (jac[0], jac[1], 0.0, jac[3], jac[4], 0.0, jac[6], jac[7], 0.0)
         q_uu = joint_hessian(chain, j, u, jac, (h, g), twisting, 0.01 * damping)
         floor, least = tol.CURVATURE_FLOOR * bend[j], least_curvature(q_uu, twisting)
-        lowest = min(lowest, least / bend[j])
+        lowest = min(lowest, pivot_of(q_uu, least, bend[j], chain.twist[j] if twisting else 0.0))
         if not least > -floor:
             note_direction(q_uu, j, least, report)
             return False
@@ -151,6 +153,8 @@ def sweep(problem: Problem, slot: int, first_free: int, k: int, damping: float, 
         decrement -= 0.5 * (q_u[0] * feed[0] + q_u[1] * feed[1] + q_u[2] * feed[2])
         value = cross_joint(turn_of(chain, j, u), value, q_up, q_ur, (feed, gain_p, gain_r))
     report.decrement = decrement
+    if twisting and first_free == 0:
+        lowest = min(lowest, pivot_of_shaft(chain, k, value[2][2]))
     note_pivot(lowest, first_free, damping, report)
     return math.isfinite(decrement)
 

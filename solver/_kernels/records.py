@@ -57,6 +57,7 @@ moment : largest moment left at a joint, N mm.     decrement : fall of the energ
 joint : the first whose block of the Hessian is not positive.     bend, twist, curvature : its direction of negative
 curvature, and that curvature, N mm.
 pivot : least over the joints of the stiffness with all beyond free to follow, over its own; 0 where the wire snaps.
+Where torsion is finite also that of the whole wire's twist, see ``blocks.pivot_of_shaft``.
 """
 DESCENT = record(
     *((name, np.int64) for name in ("slot", "iterations", "first_free", "patience", "released", "next_check")),
