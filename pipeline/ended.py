@@ -5,6 +5,7 @@ import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any
 
 AGAIN_S = 0.05
 """Seconds after which a signal that Python lost is raised again."""
@@ -16,11 +17,7 @@ class Terminated(KeyboardInterrupt):
 
 @contextmanager
 def ended_by_signal() -> Iterator[None]:
-    """Let SIGTERM end a command as Ctrl-C does, and let neither be lost.
-
-    Where a signal comes while Python cannot raise (in what it calls beside a fork, in a destructor) its exception is
-    printed and forgotten: one in some hundred commands that were ended at a fork went on to their end.
-    """
+    """Let SIGTERM end a command as Ctrl-C does, and let neither be lost."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -28,7 +25,23 @@ def ended_by_signal() -> Iterator[None]:
     def end(number: int, frame: object) -> None:
         raise Terminated
 
+    before = signal.signal(signal.SIGTERM, end)
+    try:
+        with _none_lost():
+            yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+@contextmanager
+def _none_lost() -> Iterator[None]:
+    """Raise an interruption again that comes while Python cannot raise: beside a fork, in a destructor.
+
+    There its exception is printed and forgotten: one in some hundred commands that were ended at a fork went on to
+    their end. A caller's own alarm is left alone where nothing was lost.
+    """
     lost: list[BaseException] = []
+    alarms: list[Any] = []
 
     def end_again(number: int, frame: object) -> None:
         raise lost[-1]
@@ -38,16 +51,14 @@ def ended_by_signal() -> Iterator[None]:
             hook(what)
             return
         lost.append(type(what.exc_value)())
+        alarms.append(signal.signal(signal.SIGALRM, end_again))
         signal.setitimer(signal.ITIMER_REAL, AGAIN_S)
 
     hook, sys.unraisablehook = sys.unraisablehook, unraisable
-    before = {
-        number: signal.signal(number, act) for number, act in ((signal.SIGTERM, end), (signal.SIGALRM, end_again))
-    }
     try:
         yield
     finally:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
-        for number, way in before.items():
-            signal.signal(number, way)
         sys.unraisablehook = hook
+        if alarms:
+            signal.setitimer(signal.ITIMER_REAL, 0.0)
+            signal.signal(signal.SIGALRM, alarms[0])

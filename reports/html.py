@@ -28,7 +28,7 @@ from reports.case_files import (
 from reports.counts import scans
 from reports.figures import RunFiles, declared
 from reports.listing import listed_files, listed_view
-from reports.origin import of_no_one_study
+from reports.origin import why_not_pooled
 from reports.page import Each, begun_first, draw_sections, longest, one_by_one, section, write_page
 from reports.records import read_json
 from reports.schema import ERRORS, FAILURES, OVERALL_FILE, SIMULATORS, SUMMARY, SWEEP
@@ -106,7 +106,7 @@ def render_index(out_dir: Path, embed: bool = False, each: Each = one_by_one) ->
     row = dict(whole.iloc[0]) if len(whole) else {}
     uncounted = damaged | set(summary["case"][summary["role"] == "calibration"])
     missing = not_run(out_dir)
-    mixed, cases_said = of_no_one_study(out_dir), zip(summary["role"], summary["status"], strict=True)
+    mixed, cases_said = why_not_pooled(out_dir), zip(summary["role"], summary["status"], strict=True)
     why_none = mixed or unscored(cases_said) or not_reached(out_dir)
     page = {
         **_headline(cases, _status(out_dir, [f for f in failures if not _of_another(f)], mixed), row, missing, damaged),

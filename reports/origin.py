@@ -3,7 +3,7 @@
 Each case says it of itself: a folder may hold cases that were run at different times.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -48,21 +48,22 @@ def told_alike(before: Path, after: Path) -> str:
     return "nothing differs in settings, code and inputs"
 
 
-def of_no_one_study(*outs: Path) -> str:
+def why_not_pooled(*outs: Path) -> str:
     """Why nothing may be pooled over the cases of output folders: they are of different settings, or of manifests that
     state them otherwise; empty where neither is so.
     """
-    return _of_other_settings(outs) or _of_other_manifests(outs)
+    found = {out: results_in(out) for out in outs}
+    return _of_other_settings(found) or _of_other_manifests(found)
 
 
-def _of_other_settings(outs: Sequence[Path]) -> str:
+def _of_other_settings(found: Mapping[Path, Mapping[str, Mapping[str, Any]]]) -> str:
     made = {
-        f"{out.name}: {case}" if len(outs) > 1 else case: _made(result)
-        for out in outs
-        for case, result in results_in(out).items()
+        f"{out.name}: {case}" if len(found) > 1 else case: _made(result)
+        for out, results in found.items()
+        for case, result in results.items()
     }
-    found = _over(made)
-    apart = [f"{name} {found[name]}" for name in found if len(_by_value(made, name)) > 1]
+    told = _over(made)
+    apart = [f"{name} {told[name]}" for name in told if len(_by_value(made, name)) > 1]
     if not apart:
         return ""
     more = f" and {len(apart) - 1} more" * (len(apart) > 1)
@@ -70,19 +71,24 @@ def _of_other_settings(outs: Sequence[Path]) -> str:
     return f"{what}; run all of them with the same ones, or keep them in folders of their own."
 
 
-def _of_other_manifests(outs: Sequence[Path]) -> str:
-    """The sentence on cases that a run into their folder states otherwise than the run that computed them."""
-    found: set[str] = set()
-    for out in outs:
-        results = results_in(out)
-        for run in runs_in(out):
-            stated = {name: text for name, text in run.get("stated", {}).items() if results.get(name, {}).get("stated")}
-            found |= {name for name, text in stated.items() if results[name]["stated"] != text}
-    if not found:
+def _of_other_manifests(found: Mapping[Path, Mapping[str, Mapping[str, Any]]]) -> str:
+    """The sentence on cases that a run into their folder states otherwise than the run that computed them.
+
+    Runs of an earlier version do not say what they state: those of several manifests may state anything.
+    """
+    apart: set[str] = set()
+    for out, results in found.items():
+        runs = runs_in(out)
+        if len(manifests_in(run for run in runs if "stated" not in run)) > 1:
+            apart |= results.keys()
+        own = {name: result["stated"] for name, result in results.items() if result.get("stated")}
+        apart |= {name for run in runs for name, text in run.get("stated", {}).items() if own.get(name, text) != text}
+    if not apart:
         return ""
-    what = f"Nothing is pooled: {listed(sorted(found))} was computed from another manifest, which stated it otherwise"
-    what = what if len(found) == 1 else what.replace(" was ", " were ").replace(" it ", " them ")
-    return f"{what} than a run into this folder; run all cases of one manifest, or keep them in folders of their own."
+    what = f"Nothing is pooled: {listed(sorted(apart))} was computed from another manifest, which stated it otherwise"
+    what = what if len(apart) == 1 else what.replace(" was ", " were ").replace(" it ", " them ")
+    do = "run all cases of one manifest (--resume, without --only and --shard), or keep them in folders of their own"
+    return f"{what} than a run into this folder; {do}."
 
 
 def settings_of(result: Mapping[str, Any]) -> Told:

@@ -24,7 +24,7 @@ from reports.case_files import (
 from reports.counts import scans
 from reports.figures import declared, figures_of
 from reports.html import readable_cases, run_files
-from reports.origin import of_no_one_study
+from reports.origin import why_not_pooled
 from reports.pdf_page import RIGHT, WIDE, Figured, Page
 from reports.records import read_json
 from reports.schema import FAILURES, OVERALL_FILE, SUMMARY
@@ -73,7 +73,7 @@ def _first(out_dir: Path, summary: pd.DataFrame, whole: pd.DataFrame) -> Page:
     cases = zip(summary["role"], summary["status"], strict=True)
     results = results_in(out_dir)
     simulator = next((name for one in results.values() if (name := str(one.get("simulator", "")))), "")
-    said = verdict(row, simulator) or of_no_one_study(out_dir) or unscored(cases) or not_reached(out_dir)
+    said = verdict(row, simulator) or why_not_pooled(out_dir) or unscored(cases) or not_reached(out_dir)
     frames = f"{ok} of {counted(planned, 'frame')} have a result"
     if fitted := int(summary["frames_fitted"].sum()):
         frames = scans(ok, planned, fitted, "with a result")

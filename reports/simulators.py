@@ -10,7 +10,7 @@ import pandas as pd
 from reports import _content
 from reports.case_files import copied_from_traces, counted, listed, not_reached, not_run_sentence, warnings_in
 from reports.figures.simulators import SimulatorFiles, leads
-from reports.origin import of_no_one_study
+from reports.origin import why_not_pooled
 from reports.page import draw_sections, write_page
 from reports.schema import OVERALL_FILE, SIMULATORS, SUMMARY, WHERE, Column
 from reports.tables import read_if_there
@@ -75,7 +75,7 @@ def _said(alone: Mapping[Any, Any], folder: Path, lines: Sequence[str], copied: 
     row |= {name: value for name, value in alone.items() if "strongest" in name}
     if few:  # nor has it a skill against the centreline beside those of the others
         row.pop("skill", None)
-    missing, mixed, good = not_run_sentence(folder), of_no_one_study(folder), alone["frames_ok"]
+    missing, mixed, good = not_run_sentence(folder), why_not_pooled(folder), alone["frames_ok"]
     failed = f"On {good} of {alone['frames']} frames: " if good < alone["frames"] else ""
     status = "cases missing" if missing else "frames failed" if failed else "not pooled" if mixed else "ok"
     said = verdict(row, alone["simulator"])

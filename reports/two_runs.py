@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 import pandas as pd
 
-from reports.case_files import doubted, warnings_in
+from reports.case_files import copied_from_traces, doubted, warnings_in
 from reports.diff import Difference
 
 SHOWN = 30
@@ -21,19 +21,28 @@ Judged = Literal["worse", "holds", "withheld"]
 
 
 def newly_warned(first: Path, second: Path) -> list[dict[str, str]]:
-    """Rows (case, warning) of what the second run is warned of and the first is not; the numbers in a text may differ.
+    """Rows (case, warning) of what a case of the second run is warned of and that of the first is not; the numbers in a
+    text, and the plurals that go by them, may differ. ``(all)`` is the cases together.
 
     None where the first run has no case that could say it, as golden tables have not.
     """
     known = warnings_in(first)
-    before = {_words(text) for texts in (doubted(first), *known.values()) for text in texts}
-    found = {"(all)": doubted(second)} | warnings_in(second)
+    before = {(case, _words(text)) for case, texts in ({_ALL: doubted(first)} | known).items() for text in texts}
+    found = {_ALL: doubted(second)} | warnings_in(second)
     rows = [{"case": case, "warning": text} for case, texts in found.items() for text in texts]
-    return [row for row in rows if _words(row["warning"]) not in before] if known else []
+    return [row for row in rows if (row["case"], _words(row["warning"])) not in before] if known else []
+
+
+def newly_void(first: Path, second: Path) -> str:
+    """The warning that the second run's wires were made from the traces, where the first run's were not; else empty."""
+    return "" if copied_from_traces(warnings_in(first)) else copied_from_traces(warnings_in(second))
+
+
+_ALL = "(all)"
 
 
 def _words(text: str) -> str:
-    return re.sub(r"[-+]?\d[\d.e+-]*", "#", text)
+    return re.sub(r"# (frame|place|case|point|insertion)s?\b", r"# \1", re.sub(r"[-+]?\d[\d.e+-]*", "#", text))
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,10 +77,10 @@ class Verdict:
     @property
     def word(self) -> str:
         """worse, moved, not judged (no value was held against another, or the second run's are void) or not worse."""
-        if self.void:
-            return NOT_JUDGED
         if self.judged == "worse" or len(self.frames.regressions):
             return "worse"
+        if self.void:
+            return NOT_JUDGED
         if len(self.frames.moved):
             return "moved"
         return "not worse" if self.judged == "holds" or self.frames.judged else NOT_JUDGED
@@ -80,7 +89,7 @@ class Verdict:
     def sentence(self) -> str:
         """The verdict in a line."""
         pooled = "; over all frames it is worse" * (self.judged == "worse") + f"; {self.caveat}" * bool(self.caveat)
-        if self.void:
+        if self.word == NOT_JUDGED and self.void:
             return f"NOTHING WAS JUDGED: {self.void}"
         if self.word == NOT_JUDGED:
             return f"NOTHING WAS JUDGED: no error of the first run could be held against one of the second{pooled}"

@@ -25,9 +25,9 @@ def add_settings(parser: argparse.ArgumentParser) -> None:
     add("--set", action="append", default=[], dest="settings", metavar="TABLE.KEY=VALUE", help="one setting")
 
 
-def add_gates(parser: argparse.ArgumentParser) -> None:
-    """--fail-if."""
-    says = "exit 1 where a number of overall.csv is so, or missing; >, <, >= or <=; may be repeated"
+def add_gates(parser: argparse.ArgumentParser, of: str = "overall.csv") -> None:
+    """--fail-if. of : which table is asked."""
+    says = f"exit 1 where a number of {of} is so, or missing; >, <, >= or <=; may be repeated"
     parser.add_argument("--fail-if", action="append", default=[], metavar="COLUMN>VALUE", help=says)
 
 

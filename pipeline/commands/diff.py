@@ -84,11 +84,11 @@ def _compared(first: Path, second: Path, tolerance: Mapping[str, float]) -> Any:
     from pipeline.run.another import with_another
     from pipeline.run.ledger import RESULT
     from pipeline.run.overall import damaged, found_cases, golden_cases, ratio
-    from reports.case_files import copied_from_traces, find_cases, warnings_in
+    from reports.case_files import find_cases
     from reports.diff import diff_folders, not_judged
     from reports.origin import told_alike, what_differs
     from reports.tolerance import RATIO
-    from reports.two_runs import Judged, Verdict, newly_warned
+    from reports.two_runs import Judged, Verdict, newly_void, newly_warned
 
     allowed = 1.0 + tolerance[RATIO]
     before, after = found_cases(first), found_cases(second)
@@ -112,7 +112,7 @@ def _compared(first: Path, second: Path, tolerance: Mapping[str, float]) -> Any:
     said = paired.verdict(allowed, otherwise) if paired else ""
     pooled = _pooled(with_another(first, before), with_another(second, after))
     caveat = "; ".join(filter(None, (otherwise, unpaired, not_judged(tolerance))))
-    alike, void = told_alike(first, second), copied_from_traces(warnings_in(second))
+    alike, void = told_alike(first, second), newly_void(first, second)
     return Verdict(
         (first, second), differs, pooled, said, judged, frames, caveat, alike, newly_warned(first, second), void
     )

@@ -19,7 +19,7 @@ from pipeline.run.results import Result, write_json
 from reports import tables
 from reports.case_files import DOUBTS, GOOD, doubted, not_reached
 from reports.junit import Outcome, write_junit
-from reports.origin import of_no_one_study
+from reports.origin import why_not_pooled
 from reports.schema import FAILURES, OVERALL_FILE, SUMMARY, TIMINGS
 from reports.verdict import unscored
 
@@ -54,7 +54,7 @@ class Totals:
 
 def aggregate(out: Path, run_info: dict[str, Any] | None = None, name: str = "run.json") -> Totals:
     """Write the tables over all cases found, and ``name`` where ``run_info`` is given."""
-    cases, mixed = found_cases(out), of_no_one_study(out)
+    cases, mixed = found_cases(out), why_not_pooled(out)
     among = [] if mixed else with_another(out, cases)
     found, whole = [case.result for case in cases], {} if mixed else overall(among)
     seen = [*copies(scored := validation(among)), *exchanged(out, scored)]

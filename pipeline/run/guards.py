@@ -8,6 +8,7 @@ from typing import Any
 from pipeline.run.hashing import file_hash
 from pipeline.run.inputs import other_file, stated
 from pipeline.run.log import STAGES, Stage
+from pipeline.run.provenance import written_at
 from pipeline.run.results import jsonable
 from pipeline.status import UsageError
 from pipeline.study.manifest import Case
@@ -58,7 +59,7 @@ def guard_kept(out: Path, others: Mapping[str, Case], settings: Resolved, *, fil
             if folder.name not in others:
                 continue
             known, case = read_json(folder / "result.json"), others[folder.name]
-            changed = _otherwise(known, case, settings) or (_other_file(known, case) if files else "")
+            changed = _otherwise(known, case, settings) or (_other_file(known, case, folder) if files else "")
             if changed:
                 what = f"{out}: case {folder.name!r} would keep its result of {changed}"
                 raise UsageError([f"{what}; run all cases (no --only, no --shard), or name another folder"])
@@ -73,8 +74,8 @@ def _otherwise(known: Mapping[str, Any], case: Case, settings: Resolved) -> str:
     return ""
 
 
-def _other_file(known: Mapping[str, Any], case: Case) -> str:
-    file = other_file(case, known["inputs"]) if "inputs" in known else ""
+def _other_file(known: Mapping[str, Any], case: Case, folder: Path) -> str:
+    file = other_file(case, known["inputs"], written_at(folder)) if "inputs" in known else ""
     return f"another file: {file}" if file else ""
 
 

@@ -5,6 +5,7 @@ would be taken for that of the new file, and kept.
 """
 
 import hashlib
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -71,29 +72,27 @@ def contents_of(files: Sequence[Mapping[str, Any]]) -> str:
     return hashlib.sha256(repr(rows).encode()).hexdigest()[:16]
 
 
-def other_file(case: Case, known: Sequence[Mapping[str, Any]]) -> str:
+def other_file(case: Case, known: Sequence[Mapping[str, Any]], since: float = math.inf) -> str:
     """Which file of a case is not the one that ``known`` describes, its key and path; empty where all are.
 
-    A large file in the same place, of the same size and not written to since, is the same; any other is hashed.
+    A large file in the same place, of the same size and not changed ``since`` (seconds from 1970, when ``known`` was
+    written; never asked by default), is the same; any other is hashed.
     """
     rows = {str(row.get("key")): row for row in known}
     for key, path in _named(case).items():
         if not path.exists():
             continue
         row, size = rows.get(key, {}), _size(path)
-        here = (str(path), size, _changed_ns(path)) == (row.get("path"), row.get("bytes"), row.get("changed_ns"))
-        if not (here and size > SMALL_BYTES) and row.get("sha256") != file_hash(path):
+        here = row.get("path") == str(path) and row.get("bytes") == size and size > SMALL_BYTES
+        if not (here and _changed(path) < since) and row.get("sha256") != file_hash(path):
             return f"{key}, now {path}"
     return ""
 
 
 def described(case: Case) -> list[dict[str, Any]]:
-    """Every input file of a case, once: its key in the manifest, path, hash, size and time of the last change."""
+    """Every input file of a case, once: its key in the manifest, path, hash and size."""
     named = {path: key for key, path in reversed(_named(case).items()) if path.exists()}
-    return [
-        {"key": key, "path": str(p), "sha256": file_hash(p), "bytes": _size(p), "changed_ns": _changed_ns(p)}
-        for p, key in named.items()
-    ][::-1]
+    return [{"key": key, "path": str(p), "sha256": file_hash(p), "bytes": _size(p)} for p, key in named.items()][::-1]
 
 
 def _named(case: Case) -> dict[str, Path]:
@@ -118,10 +117,11 @@ def _state(path: Path) -> State | None:
     return stat.st_size, stat.st_mtime_ns, stat.st_ino
 
 
-def _changed_ns(path: Path) -> int:
-    """When a file, or any in a folder, was last written to, in nanoseconds."""
+def _changed(path: Path) -> float:
+    """When a file, or any of a folder or behind a header, was last written or put in its place, seconds from 1970."""
     files = (path, *(path.rglob("*") if path.is_dir() else parts_of(path)))
-    return max((file.stat().st_mtime_ns for file in files if file.exists()), default=0)
+    times = [stat for file in files if file.exists() and (stat := file.stat())]
+    return max((max(stat.st_mtime, stat.st_ctime) for stat in times), default=0.0)
 
 
 def _size(path: Path) -> int:

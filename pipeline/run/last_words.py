@@ -16,7 +16,7 @@ from pipeline.run.results import Result, found_results
 from pipeline.run.sweep import heads_of, lost_points
 from reports.alike import alike
 from reports.case_files import counted, left_over_sentence
-from reports.origin import of_no_one_study
+from reports.origin import why_not_pooled
 from reports.schema import SWEEP
 from reports.sweep import silent_points
 from reports.tables import read_if_there
@@ -30,7 +30,7 @@ def failure_lines(plan: Plan, then: str = "") -> list[str]:
     then : what comes next, where it is not the run's own command for these cases.
     """
     found, cases = found_results(plan.out), []
-    lines = [*filter(None, [of_no_one_study(plan.out)]), *shared_scans(found)]
+    lines = [*filter(None, [why_not_pooled(plan.out)]), *shared_scans(found)]
     for result in found:
         cases += [row["case"] for row in result.failures]
         lines += map(_failure, alike(result.failures))

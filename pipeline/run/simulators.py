@@ -19,7 +19,7 @@ from pipeline.run.results import found_results
 from reports import tables
 from reports.case_files import copied_from_traces, listed, warnings_in
 from reports.html import render_index
-from reports.origin import of_no_one_study
+from reports.origin import why_not_pooled
 from reports.schema import FAILURES, POINTS, SIMULATORS, WHERE
 from reports.simulators import in_common, render_simulators
 from reports.verdict import COPIED, OURS, TIPS_OFF, tips_off
@@ -46,7 +46,7 @@ class Piece(NamedTuple):
 def write_comparison(out: Path, folders: Mapping[str, Path]) -> list[str]:
     """Write simulators.csv and where.csv from the output folders by simulator; returns sentences for the terminal."""
     studies = {name: with_another(folder, found_cases(folder)) for name, folder in folders.items()}
-    mixed = of_no_one_study(*folders.values())
+    mixed = why_not_pooled(*folders.values())
     pairs = [(one, other) for one in studies for other in studies if one != other and not mixed]
     common = _common(studies)
     judged = {name: found for name, found in studies.items() if common <= frames_in(found)}

@@ -17,7 +17,7 @@ from pipeline.study.manifest import Case
 from pipeline.study.settings import Resolved, Setting, SettingsError, parse_assignment, resolve
 from reports import tables
 from reports.case_files import listed
-from reports.origin import of_no_one_study
+from reports.origin import why_not_pooled
 from reports.records import read_json
 from reports.schema import SWEEP
 
@@ -139,7 +139,7 @@ def write_sweep(out: Path, heads: Sequence[Head]) -> str:
     It is removed where cases were run with different settings, or where the runs name no points: an older table belongs
     to an older result. Returns a sentence where one was removed, or earlier points are left out.
     """
-    if not heads or of_no_one_study(out):
+    if not heads or why_not_pooled(out):
         there = (out / SWEEP.file).exists()
         (out / SWEEP.file).unlink(missing_ok=True)
         again = "its points are kept, and the command with --sweep writes it again"

@@ -19,6 +19,7 @@ SIGMAS = 3.0
 PRESSED_N_MM = 0.05
 """Line load with which a wire may press on its wall, N/mm: a tip that is caught in a soft tube presses with 0.03. A
 wall of 0.03 N/mm² gives way by 1.7 mm under it: where it was opened for that, the simulated wire met none."""
+Place = tuple[float, Array]
 ROOM_VOXELS = 0.5
 """Room around the wire where the lumen is opened: the error of a trace that was bridged."""
 
@@ -28,37 +29,54 @@ def opened(
 ) -> Lumen:
     """The lumen with room for every trace of a wire of this radius, and a warning that says where it had none.
 
-    The lumen itself where all traces lie within it, or no further outside than its wall may yield. stiffness_N_mm2 : of
-    the wall.     given : whether it was given as a file instead of segmented.
+    The lumen itself where all traces lie within it; with a warning alone where they lie no further outside than its
+    wall may yield.
+
+    stiffness_N_mm2 : of the wall.     given : whether it was given as a file instead of segmented.
     """
     grid, axes = in_memory_order(lumen.distance)
     spacing = np.asarray(grid.spacing_mm)
     voxel, most = float(spacing.min()), float(np.max(grid.values))
-    allowed = OUTSIDE_VOXELS * voxel + PRESSED_N_MM / stiffness_N_mm2
-    starts, ends, said = [], [], []
+    limit = OUTSIDE_VOXELS * voxel
+    allowed = limit + PRESSED_N_MM / stiffness_N_mm2
+    links, said = _outside(grid, curves, allowed)
+    if not said:
+        _, pressed = _outside(grid, curves, limit)
+        why = f"no further than a wall of {stiffness_N_mm2:g} N/mm² yields, and it was not opened"
+        text = f"{_told(pressed, limit)}: {why}; look whether vessel is missing there" if pressed else ""
+        return replace(lumen, warnings=(*lumen.warnings, text)) if text else lumen
+    first, last = (np.concatenate(ends) * spacing for ends in zip(*links, strict=True))
+    values, radius = np.array(grid.values), np.full(len(first), radius_mm + ROOM_VOXELS * voxel)
+    cones(first, last, radius, radius, spacing, most, values)
+    do = "correct the file of the lumen" if given else "give the lumen as a file (manifest key lumen)"
+    text = f"{_told(said, allowed)}; the lumen was opened there: look whether vessel is missing, or {do}"
+    distance = reorder(grid.with_values(read_only(values)), axes)
+    return replace(lumen, distance=distance, warnings=(*lumen.warnings, text))
+
+
+def _outside(grid: Grid, curves: Sequence[Curve], allowed: float) -> tuple[list[tuple[Array, Array]], list[Place]]:
+    """Where curves lie further outside the wall than is allowed (mm, and SIGMAS): both ends of their pieces there, as
+    indices of the grid; and how deep each of their runs lies, with its middle, LPS mm.
+    """
+    links, said = [], []
     for curve in curves:
         index, depth = grid.to_index(curve.points_mm), outside_mm(grid, curve.points_mm)
         out = depth > allowed + SIGMAS * np.nan_to_num(curve.sigma_mm)
-        links = np.flatnonzero(out[:-1] | out[1:])
-        starts.append((index * spacing)[links])
-        ends.append((index * spacing)[links + 1])
+        pieces = np.flatnonzero(out[:-1] | out[1:])
+        links.append((index[pieces], index[pieces + 1]))
         runs = np.split(np.flatnonzero(out), np.flatnonzero(np.diff(np.flatnonzero(out)) > 1) + 1)
         said += [(float(depth[run].max()), curve.points_mm[run[len(run) // 2]]) for run in runs if len(run)]
-    if not said:
-        return lumen
-    values, first, last = np.array(grid.values), np.concatenate(starts), np.concatenate(ends)
-    radius = np.full(len(first), radius_mm + ROOM_VOXELS * voxel)
-    cones(first, last, radius, radius, spacing, most, values)
+    return links, said
+
+
+def _told(said: Sequence[Place], allowed: float) -> str:
+    """The places as the begin of a sentence."""
     deepest, place = max(said, key=lambda one: one[0])
     where = ", ".join(f"{x:.1f}" for x in place)
-    text = (
+    return (
         f"segment: traced wires ran up to {deepest:.2f} mm outside the lumen in {counted(said)}, allowed "
-        f"{allowed:.2f} and {SIGMAS:g} standard deviations; furthest at [{where}] mm; the lumen was "
-        "opened there: look whether vessel is missing, or "
-        + ("correct the file of the lumen" if given else "give the lumen as a file (manifest key lumen)")
+        f"{allowed:.2f} and {SIGMAS:g} standard deviations; furthest at [{where}] mm"
     )
-    distance = reorder(grid.with_values(read_only(values)), axes)
-    return replace(lumen, distance=distance, warnings=(*lumen.warnings, text))
 
 
 def outside_mm(grid: Grid, points_mm: Array) -> Array:

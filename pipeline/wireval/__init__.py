@@ -22,7 +22,7 @@ from pipeline.compare import point_to_curve
 from pipeline.status import InputError, StageError
 from solver import Catheter, Grid, GuideWire, Insertion, Insertions, Snap, Solution, Status, VesselWall, relax
 
-from .results import Results, read_results, read_run
+from .results import Results, read_results, read_run, with_gates
 
 __all__ = [
     "Catheter",
@@ -102,16 +102,21 @@ def score(
     manifest: Place,
     out: Place,
     curves: Place | Sequence[Place] | Mapping[str, Place],
+    *,
+    fail_if: str | Sequence[str] = (),
     **more: bool | int | str | Settings,
 ) -> Results:
     """Judge other simulators' wires; the results of the first one.
 
-    curves : ``"mine=DIR"``, several of these, or ``{"mine": DIR, ...}``.     more : options of ``wireval score``.
+    curves : ``"mine=DIR"``, several of these, or ``{"mine": DIR, ...}``.     fail_if : as for ``run``; asked of every
+    simulator, told in ``results.closed`` of the first.     more : options of ``wireval score``.
     Those of the others: ``read_results(out / "simulators" / NAME)``.
     """
+    gates = [fail_if] if isinstance(fail_if, str) else list(fail_if)
     named = [f"{name}={place}" for name, place in curves.items()] if isinstance(curves, Mapping) else curves
-    _carried_out("score", manifest, out=out, curves=[named] if isinstance(named, (str, Path)) else list(named), **more)
-    return read_results(out)
+    curves = [named] if isinstance(named, (str, Path)) else list(named)
+    _carried_out("score", manifest, out=out, curves=curves, fail_if=gates, **more)
+    return with_gates(read_results(out), gates)
 
 
 def calibrate(manifest: Place, out: Place, **more: bool | Settings) -> Path:

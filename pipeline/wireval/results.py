@@ -2,10 +2,10 @@
 
 import math
 import warnings
-from collections.abc import Sequence, Sized
+from collections.abc import Mapping, Sequence, Sized
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import pandas as pd
 
@@ -14,7 +14,7 @@ from pipeline.run.results import Result, found_results
 from pipeline.status import InputError, did_you_mean
 from reports import tables
 from reports.case_files import CaseFiles, amiss, find_cases, listed, not_run, read_case
-from reports.origin import of_no_one_study
+from reports.origin import why_not_pooled
 from reports.schema import ERRORS, FAILURES, OVERALL_FILE, POINTS, SUMMARY, SWEEP, Table
 
 _SHOWN = ["case", "status", "frames", "frames_ok", "rms_mm", "tip_median_mm", "skill_strongest", "strongest_null"]
@@ -62,7 +62,7 @@ class Results:
             or not len(self.summary)
             or len(self.failures)
             or not_run(self.out)
-            or of_no_one_study(self.out)
+            or why_not_pooled(self.out)
         ):
             return False
         return not any(amiss(case.folder) for case in self.cases.values())
@@ -88,7 +88,7 @@ class Results:
 def read_results(out: str | Path) -> Results:
     """Read the folder that ``wireval run`` wrote; raises InputError where it is none.
 
-    Warns of cases whose files are not as they were written.
+    Warns of cases whose files are not as they were written, and of tables over all cases that are of others.
     """
     out = Path(out)
     if not out.is_dir():
@@ -104,26 +104,29 @@ def read_results(out: str | Path) -> Results:
     for message in damaged.values():
         warnings.warn(f"{message}; its errors are left out", stacklevel=2)
     found = _results(out, cases, tuple(damaged))
-    return replace(found, other_tables=_told_of_others(found, [one for one in results if one.status != "damaged"]))
+    if others := _tables_of_others(found, [one for one in results if one.status != "damaged"]):
+        warnings.warn(f"{others}; `wireval report {out}` writes them anew", stacklevel=2)
+    return replace(found, other_tables=others)
 
 
-def _told_of_others(found: Results, results: Sequence[Result]) -> str:
-    """Warn of tables over all cases that are not of these cases, as those of one shard of several: the warning."""
+def _tables_of_others(found: Results, results: Sequence[Result]) -> str:
+    """That tables over all cases are not of these cases, as those of one shard of several; empty where they are."""
     rows = {str(row["case"]): row for row in found.summary.to_dict("records")}
     known = {one.case: one.summary for one in results}
-    asked = "frames_ok", "rms_mm"
     apart = sorted(
         name
         for name in (rows.keys() | known.keys()) - set(found.damaged)
-        if name not in rows
-        or name not in known
-        or any(not _same(rows[name].get(key), known[name].get(key)) for key in asked)
+        if name not in rows or name not in known or not _alike(rows[name], known[name])
     )
     if not rows or not apart:
         return ""
-    said = f"{found.out}: summary.csv and overall.csv are not of the cases beside them ({listed(apart)})"
-    warnings.warn(f"{said}; `wireval report {found.out}` writes them anew", stacklevel=3)
-    return said
+    return f"{found.out}: summary.csv and overall.csv are not of the cases beside them ({listed(apart)})"
+
+
+def _alike(row: Mapping[Any, Any], other: Mapping[str, Any]) -> bool:
+    """Whether the numbers that both rows of a summary have are the same, as far as a table has them."""
+    numbers = [column.name for column in SUMMARY if column.kind != "text" and column.name in other]
+    return all(_same(row.get(name), other[name]) for name in numbers)
 
 
 def _same(one: float | None, other: float | None) -> bool:
@@ -138,7 +141,11 @@ def read_run(out: Path, gates: Sequence[str] = ()) -> Results:
 
     gates : its ``fail_if``.
     """
-    found = read_results(out) if find_cases(out) else _results(out, {})
+    return with_gates(read_results(out) if find_cases(out) else _results(out, {}), gates)
+
+
+def with_gates(found: Results, gates: Sequence[str]) -> Results:
+    """The results with a sentence for each ``fail_if`` that holds."""
     known = found.overall.head(1).dropna(axis=1).to_dict("records")
     pooled = {str(name): value for row in known for name, value in row.items()}
     return replace(found, closed=tuple(filter(None, (gate(text).closed(pooled) for text in gates))))

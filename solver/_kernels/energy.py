@@ -7,7 +7,7 @@ from typing import Any
 
 from solver import _tolerances as tol
 from solver._kernels import wall_law
-from solver._kernels.algebra import ZERO3, Three, add3, dot, load3, minus, store3
+from solver._kernels.algebra import Three, dot, load3, minus, store3
 from solver._kernels.data import Chain, Problem
 from solver._kernels.field import depth_in_grid, indices, jet_at, locate, store_jet, trilinear, value
 from solver._kernels.flags import inlined, kernel, merged
@@ -75,11 +75,12 @@ def load_energy(chain: Chain, x: Any, k: int) -> float:
 
 @kernel
 def load_moved(chain: Chain, x: Any, k: int) -> float:
-    """Energy, N mm, of which the places that loads are counted from and act at keep the last digit."""
-    total = ZERO3
+    """Size of what cancels in ``load_energy``, N mm: rounding is a share of it."""
+    total = 0.0
     for n in range(1, k + 1):
-        total = add3(total, load3(chain.load, n))
-    return abs(dot(total, load3(x, 0)))
+        for a in range(3):
+            total += abs(chain.load[n, a] * x[0, a])
+    return total
 
 
 @kernel

@@ -71,5 +71,7 @@ def test_who_gave_the_lumen_is_not_told_to_give_it() -> None:
 def test_a_soft_wall_that_a_wire_presses_into_is_not_opened() -> None:
     """It was: the simulated wire went where the tube's wall had been, 2 mm off, and a calibration blamed all else."""
     lumen, pressed = tube("C"), traced(wire(8.5, 2.0, 7.0))  # 1 mm outside
-    assert opened(lumen, [pressed], 0.2, 0.03, given=True) is lumen
+    found = opened(lumen, [pressed], 0.2, 0.03, given=True)
+    assert found.distance is lumen.distance
+    assert "no further than a wall of 0.03 N/mm² yields, and it was not opened" in found.warnings[1]
     assert "allowed 0.33" in opened(lumen, [pressed], 0.2, 2.0, given=True).warnings[1]

@@ -13,7 +13,7 @@ import wireval
 from pipeline.cli import main
 from pipeline.run import aggregate, case, inputs
 from reports.case_files import doubted
-from reports.origin import of_no_one_study, what_differs
+from reports.origin import what_differs, why_not_pooled
 from tests.pipeline.test_calibrate import PARAMETERS
 
 QUICK = ("--until", "load", "-q")
@@ -110,7 +110,7 @@ def test_shards_of_different_settings_are_not_pooled(
     main(["run", str(study), "-o", str(tmp_path / "3"), "--until", "compare", "-q", "--shard", "1/2", *FINE])
     shutil.copytree(tmp_path / "3", out, dirs_exist_ok=True)
     assert main(["report", *words]) == 0
-    assert of_no_one_study(out) == ""
+    assert why_not_pooled(out) == ""
     assert len(pd.read_csv(out / "overall.csv")) == 1
 
 
@@ -122,7 +122,7 @@ def test_shards_that_ended_at_different_stages_are_not_pooled(study: Path, tmp_p
         assert main([*words, "--until", until]) == 0
         shutil.copytree(tmp_path / shard[0], out, dirs_exist_ok=True)
     assert main(["report", str(out), "--overview"]) == 1
-    assert "(--until simulate in a; compare in b)" in of_no_one_study(out)
+    assert "(--until simulate in a; compare in b)" in why_not_pooled(out)
 
 
 def test_a_shard_that_was_not_merged_is_missed(study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -166,7 +166,7 @@ def test_a_result_that_cannot_be_read_says_nothing_of_settings(study: Path, tmp_
     run(study, tmp_path / "out")
     path = tmp_path / "out" / "cases" / "a" / "result.json"
     path.write_text(json.dumps([1]), encoding="utf-8")
-    assert of_no_one_study(tmp_path / "out") == ""
+    assert why_not_pooled(tmp_path / "out") == ""
 
 
 def test_what_is_missing_is_no_ok_anywhere(study: Path, tmp_path: Path) -> None:
@@ -290,3 +290,30 @@ def test_what_is_doubtful_among_cases_of_several_shards_is_found_by_report(
     assert alike in (out / "index.html").read_text(encoding="utf-8").replace("&#39;", "'")
     apart = sum(pd.read_csv(out / "summary.csv")["warnings"])
     assert int(pd.read_csv(out / "overall.csv")["warnings"].item()) == apart + len(doubted(out))
+
+
+def test_the_command_that_the_tool_names_next_is_pooled(study: Path, tmp_path: Path) -> None:
+    """A case that failed was mended in the manifest and run alone; the shards of before still stated the old one."""
+    out = tmp_path / "out"
+    for shard in ("1/2", "2/2"):
+        run(study, out, "--shard", shard)
+    path = study / "manifest.toml"
+    head, _, last = path.read_text(encoding="utf-8").rpartition("[[case]]")
+    path.write_text(f'{head}[[case]]\nphantom = "another"{last}', encoding="utf-8")
+    assert run(study, out, "--only", "b", "--resume") == 0
+    assert why_not_pooled(out) == ""
+
+
+def test_runs_of_two_manifests_that_do_not_say_what_they_state_are_not_pooled(study: Path, tmp_path: Path) -> None:
+    """So are the records of earlier versions."""
+    out = tmp_path / "out"
+    run(study, tmp_path / "1", "--shard", "1/2")
+    with_a_thinner_wire(study)
+    run(study, tmp_path / "2", "--shard", "2/2")
+    for part in ("1", "2"):
+        shutil.copytree(tmp_path / part, out, dirs_exist_ok=True)
+    for path in out.glob("run*.json"):
+        known = json.loads(path.read_text(encoding="utf-8"))
+        known.pop("stated")
+        path.write_text(json.dumps(known), encoding="utf-8")
+    assert "Nothing is pooled: a, b were computed from another manifest" in why_not_pooled(out)

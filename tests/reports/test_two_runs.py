@@ -428,8 +428,8 @@ def test_a_message_with_control_characters_is_still_xml(tmp_path: Path) -> None:
     assert (suite.get("name"), failure.get("message"), failure.text) == ("ab[0m", "ok", "line\nnext")
 
 
-def warned(out: Path, *texts: str) -> None:
-    path = out / "cases" / "a" / "result.json"
+def warned(out: Path, *texts: str, case: str = "a") -> None:
+    path = out / "cases" / case / "result.json"
     result = json.loads(path.read_text(encoding="utf-8"))
     path.write_text(json.dumps(result | {"warnings": [*texts]}), encoding="utf-8")
 
@@ -437,13 +437,18 @@ def warned(out: Path, *texts: str) -> None:
 def test_what_only_the_second_run_is_warned_of_is_told(first: Path, second: Path, tmp_path: Path) -> None:
     """A gate stayed open over wires that were doubted, and not a word of it."""
     before = shutil.copytree(first, tmp_path / "before")
-    warned(before, "the wall is 0.2 mm off")
-    warned(second, "the wall is 0.31 mm off", "the tip looks folded")
+    warned(before, "1 frame: the wall is 0.2 mm off")
+    warned(second, "2 frames: the wall is 0.31 mm off", "the tip looks folded")
+    warned(second, "1 frame: the wall is 0.2 mm off", case="b")
     files = {name: tmp_path / f"diff.{name}" for name in ("json", "markdown", "html")}
     words = [word for name, path in files.items() for word in (f"--{name}", str(path))]
     assert main(["diff", str(before), str(second), *words]) == 0
     texts = {name: path.read_text(encoding="utf-8") for name, path in files.items()}
-    assert json.loads(texts["json"])["warned"] == [{"case": "a", "warning": "the tip looks folded"}]
+    rows = json.loads(texts["json"])["warned"]
+    assert [(row["case"], row["warning"]) for row in rows] == [
+        ("a", "the tip looks folded"),
+        ("b", "1 frame: the wall is 0.2 mm off"),
+    ]
     assert all("What only the second run is warned of" in texts[name] for name in ("markdown", "html"))
     assert all("the tip looks folded" in text for text in texts.values())
 
@@ -456,3 +461,7 @@ def test_wires_that_were_made_from_the_traces_pass_no_gate(
     assert main(["diff", str(first), str(second), "--junit", str(tmp_path / "j.xml")]) == 1
     assert f"NOTHING WAS JUDGED: a: 0.001 mm: {MADE_FROM_TRACES}" in capsys.readouterr().out
     assert ET.parse(tmp_path / "j.xml").getroot().find(".//failure[@type='not_judged']") is not None
+    assert main(["diff", str(second), str(second)]) == 0, "of a baseline that says the same nothing is new"
+    times(second, 3.0)
+    assert main(["diff", str(first), str(second)]) == 1
+    assert "Verdict: WORSE" in capsys.readouterr().out

@@ -22,7 +22,7 @@ from solver import Grid
 
 OUTSIDE_VOXELS, MOST_OUTSIDE = 2.0, 0.25
 """Points so far outside the wall, and their share above which a curve is not in this lumen: segmented ones and traces
-differ by a voxel; where fewer lie outside, the lumen is opened there and that is said."""
+differ by a voxel; where fewer lie outside, that is said, and the lumen opened unless its wall may yield as far."""
 CHORD_MM, LONGER = 2.0, 0.02
 """A curve longer by this share than arcs through its points so far apart zigzags: skeletons of voxels by 0.06 to 0.09,
 points that scatter by a tenth of their distance by 0.01."""
