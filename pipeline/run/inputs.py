@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pipeline.load import parts_of
+from pipeline.load import Source, parts_of
 from pipeline.run.hashing import file_hash
 from pipeline.status import FrameStatus, StageError
 from pipeline.study.manifest import Case
@@ -54,6 +54,10 @@ UNSTATED = {
     *("calibrated", "calibrated_scans", "own_parameters", "as_stated", "assumed"),
 }
 """Keys that name files, whose contents count, and what is no statement of the manifest."""
+OF_FILES = ("reference", "frames", "lumen", "traces")
+"""Keys of which all but the files' places is a statement: how many, which dataset, item or label, the wall's level."""
+NOT_LENT = {"role", "group", "phantom", "uncertainty", "push_force_N", "push_force_sigma_N"}
+"""What a case whose clamp is borrowed states for itself alone."""
 SMALL_BYTES = 2**20
 """A file up to this is hashed where only a larger one's size is asked for."""
 
@@ -62,8 +66,19 @@ def stated(case: Case) -> str:
     """A hash of what the manifest states of a case, but for its files, whatever a calibration has made of it."""
     if case.as_stated:
         return case.as_stated
-    other = stated(case.entry_case) if case.entry_case is not None else ""
-    return hashlib.sha256(f"{case.model_dump_json(exclude=UNSTATED)}{other}".encode()).hexdigest()[:16]
+    other = _told(case.entry_case, UNSTATED | NOT_LENT) if case.entry_case is not None else ""
+    return hashlib.sha256(f"{_told(case, UNSTATED)}{other}".encode()).hexdigest()[:16]
+
+
+def _told(case: Case, but: set[str]) -> str:
+    return f"{case.model_dump_json(exclude=but)}{[_without_place(getattr(case, key)) for key in OF_FILES]}"
+
+
+def _without_place(value: Source | Path | Sequence[Source] | None) -> object:
+    """What is stated of files beside where they lie; a list of as many for several."""
+    if isinstance(value, Source):
+        return sorted((name, part) for name, part in vars(value).items() if name != "path")
+    return [_without_place(one) for one in value] if isinstance(value, Sequence) else value is not None
 
 
 def contents_of(files: Sequence[Mapping[str, Any]]) -> str:

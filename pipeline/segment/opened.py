@@ -24,6 +24,11 @@ ROOM_VOXELS = 0.5
 """Room around the wire where the lumen is opened: the error of a trace that was bridged."""
 
 
+def may_lie_outside_mm(voxel_mm: float, stiffness_N_mm2: float) -> float:
+    """How far outside its wall a wire's axis may lie, mm, before the wall is at fault: a voxel, and what it yields."""
+    return OUTSIDE_VOXELS * voxel_mm + PRESSED_N_MM / stiffness_N_mm2
+
+
 def opened(
     lumen: Lumen, curves: Sequence[Curve], radius_mm: float, stiffness_N_mm2: float = np.inf, *, given: bool = False
 ) -> Lumen:
@@ -37,8 +42,7 @@ def opened(
     grid, axes = in_memory_order(lumen.distance)
     spacing = np.asarray(grid.spacing_mm)
     voxel, most = float(spacing.min()), float(np.max(grid.values))
-    limit = OUTSIDE_VOXELS * voxel
-    allowed = limit + PRESSED_N_MM / stiffness_N_mm2
+    limit, allowed = OUTSIDE_VOXELS * voxel, may_lie_outside_mm(voxel, stiffness_N_mm2)
     links, said = _outside(grid, curves, allowed)
     if not said:
         _, pressed = _outside(grid, curves, limit)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pandas as pd
@@ -11,7 +12,10 @@ import pytest
 
 import wireval
 from pipeline.cli import main
+from pipeline.load import Source
+from pipeline.load.geometry import Mask
 from pipeline.run import aggregate, case, inputs
+from pipeline.study.manifest import read_manifest
 from reports.case_files import doubted
 from reports.origin import what_differs, why_not_pooled
 from tests.pipeline.test_calibrate import PARAMETERS
@@ -317,3 +321,18 @@ def test_runs_of_two_manifests_that_do_not_say_what_they_state_are_not_pooled(st
         known.pop("stated")
         path.write_text(json.dumps(known), encoding="utf-8")
     assert "Nothing is pooled: a, b were computed from another manifest" in why_not_pooled(out)
+
+
+def test_all_but_the_places_of_files_is_stated(study: Path) -> None:
+    """A lumen at another level, a frame less, was the same case; a lender's group was the borrower's."""
+    (a, b) = read_manifest(study / "manifest.toml").cases
+    said = inputs.stated(a)
+    assert said != inputs.stated(b)
+    moved = tuple(Source(one.path.with_name("elsewhere.mha")) for one in a.frames)
+    assert inputs.stated(a.model_copy(update={"frames": moved})) == said
+    mask = Mask(Path("lumen.nrrd"), level=0.3)
+    lumens = [a.model_copy(update={"lumen": one}) for one in (mask, replace(mask, level=0.8), replace(mask, label=2))]
+    others = [*lumens, a.model_copy(update={"frames": a.frames[:1]})]
+    assert len({said, *map(inputs.stated, others)}) == 5
+    lent = [b.model_copy(update={"entry_case": one}) for one in (a, a.model_copy(update={"group": "day 1"}))]
+    assert len(set(map(inputs.stated, lent))) == 1

@@ -16,8 +16,10 @@ from pipeline.cli import main
 from pipeline.model import Curve, arc_length
 from pipeline.run.stages.beside import beside_what_is_seen
 from pipeline.run.stages.known import Frame
-from pipeline.run.stages.own_curves import CORNER_VOXELS, LONGER, corner_mm, known_by_tip, rough, zigzag
+from pipeline.run.stages.own_curves import CORNER_VOXELS, LONGER, _in_lumen, corner_mm, known_by_tip, rough, zigzag
+from pipeline.status import FrameStatus
 from pipeline.trace.config import TraceConfig
+from solver import Grid
 from tests.pipeline.known_study import MANIFEST, QUICK, Array, errors_of, peers, write_csv, write_study
 
 WIRES = peers("bend")
@@ -218,3 +220,13 @@ def test_curves_that_are_all_a_little_off_are_told(own: Callable[[Array], Array]
     warnings = beside_what_is_seen(frames, seen, TraceConfig(), 0.4)
     assert len(warnings) == bool(said)
     assert all(said in text for text in warnings)
+
+
+def test_a_curve_that_a_soft_wall_yields_to_is_in_its_lumen() -> None:
+    """Half of it 1 mm outside a tube of 0.03 N/mm² was "in other coordinates"; the finer its voxels, the sooner."""
+    x, y, _ = np.meshgrid(*(0.25 * np.arange(n) for n in (40, 40, 60)), indexing="ij")
+    lumen = Grid(np.minimum(np.hypot(x - 5.0, y - 5.0) - 1.5, 3.0), np.full(3, 0.25), np.zeros(3))
+    points = np.column_stack([np.repeat([5.0, 7.5], 20), np.full(40, 5.0), np.linspace(1.0, 14.0, 40)])
+    curve = Curve(points, np.full(40, np.nan))
+    assert _in_lumen(curve, lumen, 2.0).status is FrameStatus.TRACE_LEFT_LUMEN
+    assert _in_lumen(curve, lumen, 0.03) is curve

@@ -13,7 +13,7 @@ from pipeline.arrays.polyline import resample
 from pipeline.load.curves import read_curve
 from pipeline.model import Array, Curve, arc_length
 from pipeline.run.stages.known import Context, Frame
-from pipeline.segment.opened import outside_mm
+from pipeline.segment.opened import may_lie_outside_mm, outside_mm
 from pipeline.simulate.others import begun, oddity
 from pipeline.status import FrameStatus
 from pipeline.trace import of_length
@@ -56,7 +56,7 @@ def as_given(run: Context, frame: Frame, curve: Curve, distance: Grid) -> Frame:
     expected = None if np.isnan(frame.expected_mm) else frame.expected_mm
     curve = of_length(Curve(points, np.full(len(points), np.nan), note=curve.note), expected, run.config.trace)
     frame = replace(frame, voxels=frame.voxels or known_by_tip(points))
-    return frame.traced_by(_in_lumen(_smooth(curve), distance))
+    return frame.traced_by(_in_lumen(_smooth(curve), distance, run.case.wall.stiffness_N_mm2))
 
 
 def known_by_tip(points_mm: Array) -> str:
@@ -82,15 +82,17 @@ def _smooth(curve: Curve) -> Curve:
     return replace(curve, status=FrameStatus.TRACE_FAILED, note=note)
 
 
-def _in_lumen(curve: Curve, distance: Grid) -> Curve:
-    """The curve; one of which much lies outside the lumen has left it."""
-    points = resample(curve.points_mm, 0.5 * float(distance.spacing_mm.min()))
-    share = float(np.mean(outside_mm(distance, points) > OUTSIDE_VOXELS * float(distance.spacing_mm.min())))
+def _in_lumen(curve: Curve, distance: Grid, stiffness_N_mm2: float) -> Curve:
+    """The curve; one of which much lies outside the lumen, further than its wall may yield, has left it."""
+    voxel = float(distance.spacing_mm.min())
+    allowed = max(OUTSIDE_VOXELS * voxel, may_lie_outside_mm(voxel, stiffness_N_mm2))
+    share = float(np.mean(outside_mm(distance, resample(curve.points_mm, 0.5 * voxel)) > allowed))
     if curve.status is not FrameStatus.OK or share <= MOST_OUTSIDE:
         return curve
     note = (
-        f"{curve.note}: {100 * share:.0f} % of the curve lie over {OUTSIDE_VOXELS:g} voxels outside the lumen, allowed "
-        f"{100 * MOST_OUTSIDE:.0f} %; are lumen and curve in the same coordinates (LPS mm), and of the same phantom?"
+        f"{curve.note}: {100 * share:.0f} % of the curve lie over {allowed / voxel:.2g} voxels outside the lumen, "
+        f"allowed {100 * MOST_OUTSIDE:.0f} %; are lumen and curve in the same coordinates (LPS mm), and of the same "
+        "phantom?"
     )
     return replace(curve, status=FrameStatus.TRACE_LEFT_LUMEN, note=note)
 
