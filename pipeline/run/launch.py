@@ -162,6 +162,7 @@ def launch(plan: Plan) -> tuple[Totals, Path]:
     except WriteError as error:
         raise UsageError([str(error)]) from error
     remove_leftovers(out)
+    swept = (out / SWEEP.file).exists()
     for earlier in OVER_ALL:
         (out / earlier).unlink(missing_ok=True)
     if plan.template.fresh:
@@ -172,7 +173,7 @@ def launch(plan: Plan) -> tuple[Totals, Path]:
         _forget_stated(out, plan.ids, but=name)
     _refuse(plan)
     run_cases(plan, [*plan.jobs, *plan.sweep_jobs])
-    if removed := write_sweep(out, found_heads(out)):  # points of other shards so far included
+    if removed := write_sweep(out, found_heads(out), earlier=swept):  # points of other shards so far included
         sys.stderr.write(f"{removed}\n")
     info |= {"provenance": code_state(), "assumptions": plan.assumptions}
     Store(plan.template.cache).trim()

@@ -133,14 +133,16 @@ def _amiss(place: Path, plain: Result, there: Mapping[str, Result], asked: Conta
     return None if found.same_inputs(plain) else lost(plain.case, "outdated", why)
 
 
-def write_sweep(out: Path, heads: Sequence[Head]) -> str:
+def write_sweep(out: Path, heads: Sequence[Head], *, earlier: bool = False) -> str:
     """Write sweep.csv: the plain result first, then every point, each of them case by case and over all of them.
 
     It is removed where cases were run with different settings, or where the runs name no points: an older table belongs
     to an older result. Returns a sentence where one was removed, or earlier points are left out.
+
+    earlier : whether one of an earlier run was removed before.
     """
     if not heads or why_not_pooled(out):
-        there = (out / SWEEP.file).exists()
+        there = earlier or (out / SWEEP.file).exists()
         (out / SWEEP.file).unlink(missing_ok=True)
         again = "its points are kept, and the command with --sweep writes it again"
         return f"{out / SWEEP.file}: removed, it belongs to an earlier run: {again}" * there

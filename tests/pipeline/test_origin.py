@@ -208,16 +208,22 @@ def with_a_thinner_wire(study: Path) -> None:
     path.write_text(text.replace("radius_mm = 0.18", "radius_mm = 0.17"), encoding="utf-8")
 
 
-def test_shards_of_manifests_that_state_a_case_otherwise_are_not_pooled(
-    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """A second wire, ten times as stiff, was pooled with the first, exit 0."""
+def of_two_manifests(study: Path, tmp_path: Path) -> Path:
+    """Two shards in one folder, of which the second's manifest has another wire."""
     out = tmp_path / "out"
     run(study, tmp_path / "1", "--shard", "1/2")
     with_a_thinner_wire(study)
     run(study, tmp_path / "2", "--shard", "2/2")
     for part in ("1", "2"):
         shutil.copytree(tmp_path / part, out, dirs_exist_ok=True)
+    return out
+
+
+def test_shards_of_manifests_that_state_a_case_otherwise_are_not_pooled(
+    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A second wire, ten times as stiff, was pooled with the first, exit 0."""
+    out = of_two_manifests(study, tmp_path)
     capsys.readouterr()
     assert main(["report", str(out), "--overview"]) == 1
     said = "Nothing is pooled: a, b were computed from another manifest, which stated them otherwise"
@@ -310,12 +316,7 @@ def test_the_command_that_the_tool_names_next_is_pooled(study: Path, tmp_path: P
 
 def test_runs_of_two_manifests_that_do_not_say_what_they_state_are_not_pooled(study: Path, tmp_path: Path) -> None:
     """So are the records of earlier versions."""
-    out = tmp_path / "out"
-    run(study, tmp_path / "1", "--shard", "1/2")
-    with_a_thinner_wire(study)
-    run(study, tmp_path / "2", "--shard", "2/2")
-    for part in ("1", "2"):
-        shutil.copytree(tmp_path / part, out, dirs_exist_ok=True)
+    out = of_two_manifests(study, tmp_path)
     for path in out.glob("run*.json"):
         known = json.loads(path.read_text(encoding="utf-8"))
         known.pop("stated")
