@@ -13,8 +13,8 @@ import shtab
 
 from pipeline import one_thread
 from pipeline.commands import VERBS, complain, unwritable
+from pipeline.commands.ended import Terminated, ended_by_signal
 from pipeline.commands.summaries import remove_summaries
-from pipeline.ended import Terminated, ended_by_signal
 from pipeline.status import InputError, StageError, did_you_mean
 from pipeline.streams import lasting
 from reports.atomic import WriteError

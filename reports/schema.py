@@ -140,6 +140,8 @@ def predictor(name: str, label: str, meaning: str) -> Column:
 
 SUMMARY = Table("summary.csv")
 OVERALL_FILE = "overall.csv"  # one row over all validation cases, with the columns of summary.csv
+ALL = "(all)"
+"""Stands where the name of a case would, in rows over all of them."""
 ERRORS = Table("errors.csv", pooled_in=SUMMARY)
 POINTS = Table("points.csv.gz")
 FAILURES = Table("failures.csv")

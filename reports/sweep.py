@@ -3,11 +3,10 @@
 import pandas as pd
 
 from reports.case_files import counted
+from reports.schema import ALL
 
 UNCHANGED = "(plain)"
 """The parameter of the rows of sweep.csv in which nothing was changed."""
-ALL = "(all)"
-"""The case of the rows over all of them."""
 
 
 def silent_points(sweep: pd.DataFrame) -> list[str]:

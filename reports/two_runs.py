@@ -10,6 +10,7 @@ import pandas as pd
 
 from reports.case_files import copied_from_traces, doubted, warnings_in
 from reports.diff import Difference
+from reports.schema import ALL
 
 SHOWN = 30
 """Regressions that a text names; JSON and JUnit have all."""
@@ -18,27 +19,29 @@ NOT_JUDGED = "not judged"
 """The word on two runs of which nothing was compared: a gate must not stay open for that."""
 
 Judged = Literal["worse", "holds", "withheld"]
+Warned = Mapping[str, Sequence[str]]
+"""What each case of a run is warned of, by case; under ALL what is doubtful among them."""
 
 
-def newly_warned(first: Path, second: Path) -> list[dict[str, str]]:
+def warned_of(out: Path) -> Warned:
+    """What a run and its cases are warned of."""
+    return {ALL: doubted(out)} | warnings_in(out)
+
+
+def newly_warned(first: Warned, second: Warned) -> list[dict[str, str]]:
     """Rows (case, warning) of what a case of the second run is warned of and that of the first is not; the numbers in a
-    text, and the plurals that go by them, may differ. ``(all)`` is the cases together.
+    text, and the plurals that go by them, may differ.
 
     None where the first run has no case that could say it, as golden tables have not.
     """
-    known = warnings_in(first)
-    before = {(case, _words(text)) for case, texts in ({_ALL: doubted(first)} | known).items() for text in texts}
-    found = {_ALL: doubted(second)} | warnings_in(second)
-    rows = [{"case": case, "warning": text} for case, texts in found.items() for text in texts]
-    return [row for row in rows if (row["case"], _words(row["warning"])) not in before] if known else []
+    before = {(case, _words(text)) for case, texts in first.items() for text in texts}
+    rows = [{"case": case, "warning": text} for case, texts in second.items() for text in texts]
+    return [row for row in rows if (row["case"], _words(row["warning"])) not in before] if len(first) > 1 else []
 
 
-def newly_void(first: Path, second: Path) -> str:
+def newly_void(first: Warned, second: Warned) -> str:
     """The warning that the second run's wires were made from the traces, where the first run's were not; else empty."""
-    return "" if copied_from_traces(warnings_in(first)) else copied_from_traces(warnings_in(second))
-
-
-_ALL = "(all)"
+    return "" if copied_from_traces(first) else copied_from_traces(second)
 
 
 def _words(text: str) -> str:

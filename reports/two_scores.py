@@ -8,6 +8,7 @@ from typing import Any
 import pandas as pd
 
 from reports.diff import Difference
+from reports.schema import ALL
 from reports.two_runs import Judged, Verdict
 
 
@@ -16,7 +17,7 @@ def together(runs: tuple[Path, Path], parts: Mapping[str, Verdict], gone: list[s
 
     gone, come : simulators that only the first run has, which is a regression, and only the second, which is new.
     """
-    whole = {"case": "(all)", "frame": pd.NA, "column": "simulator", "change": math.nan, "allowed": math.nan}
+    whole = {"case": ALL, "frame": pd.NA, "column": "simulator", "change": math.nan, "allowed": math.nan}
     lost = {"before": "present", "after": "missing", "verdict": "regression"}
     found = {"before": "missing", "after": "present", "verdict": "new"}
     lone = [{"simulator": n} | whole | what for names, what in ((gone, lost), (come, found)) for n in names]

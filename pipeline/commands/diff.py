@@ -88,7 +88,7 @@ def _compared(first: Path, second: Path, tolerance: Mapping[str, float]) -> Any:
     from reports.diff import diff_folders, not_judged
     from reports.origin import told_alike, what_differs
     from reports.tolerance import RATIO
-    from reports.two_runs import Judged, Verdict, newly_void, newly_warned
+    from reports.two_runs import Judged, Verdict, newly_void, newly_warned, warned_of
 
     allowed = 1.0 + tolerance[RATIO]
     before, after = found_cases(first), found_cases(second)
@@ -112,10 +112,9 @@ def _compared(first: Path, second: Path, tolerance: Mapping[str, float]) -> Any:
     said = paired.verdict(allowed, otherwise) if paired else ""
     pooled = _pooled(with_another(first, before), with_another(second, after))
     caveat = "; ".join(filter(None, (otherwise, unpaired, not_judged(tolerance))))
-    alike, void = told_alike(first, second), newly_void(first, second)
-    return Verdict(
-        (first, second), differs, pooled, said, judged, frames, caveat, alike, newly_warned(first, second), void
-    )
+    warned = warned_of(first), warned_of(second)
+    told = told_alike(first, second), newly_warned(*warned), newly_void(*warned)
+    return Verdict((first, second), differs, pooled, said, judged, frames, caveat, *told)
 
 
 OF_ALL = "frames", "frames_ok", "within_1mm"

@@ -71,7 +71,7 @@ def main(args: argparse.Namespace) -> int:
     sys.stderr.writelines(f"{line}\n" for line in warnings if args.quiet)
     for line in side_by_side(args.out, {name: plan.out for name, plan in plans.items()}, args.embed):
         say(line)
-    closed = [f"{n}: {why}" for n in totals if n != OURS for g in gates if (why := _closed(g, plans[n], totals[n]))]
+    closed = [f"{n}: {why}" for n in totals if n != OURS for why in _closed(gates, plans[n], totals[n])]
     sys.stderr.writelines(f"{line}\n" for line in closed)
     return 0 if all(one.all_ok for one in totals.values()) and not closed else 1
 
@@ -97,12 +97,13 @@ def _judged(plans: "Mapping[str, Plan]", quiet: bool) -> "dict[str, Totals]":
     return done
 
 
-def _closed(gate: "Gate", plan: "Plan", totals: "Totals") -> str:
-    """Why a simulator must not pass a gate; empty where it may. Errors of wires made from the traces are none."""
+def _closed(gates: "Sequence[Gate]", plan: "Plan", totals: "Totals") -> list[str]:
+    """Why a simulator must not pass, gate by gate. Errors of wires made from the traces are none."""
     from reports.case_files import copied_from_traces, warnings_in
 
-    copied = copied_from_traces(warnings_in(plan.out))
-    return f"gate closed: {gate.asked}: {copied}" if copied else gate.closed(totals.pooled)
+    copied = copied_from_traces(warnings_in(plan.out)) if gates else ""
+    told = (f"gate closed: {gate.asked}: {copied}" if copied else gate.closed(totals.pooled) for gate in gates)
+    return [why for why in told if why]
 
 
 def said_once(said: Mapping[str, Sequence[str]]) -> list[str]:

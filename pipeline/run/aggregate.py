@@ -96,9 +96,10 @@ def aggregate(out: Path, run_info: dict[str, Any] | None = None, name: str = "ru
 def _with_those_of_runs(out: Path, seen: Sequence[str]) -> list[str]:
     """What runs have doubted, and what is seen among all cases: what no shard could see stands in a file of its own."""
     (out / DOUBTS).unlink(missing_ok=True)
-    if unsaid := [text for text in seen if text not in doubted(out)]:
+    said = doubted(out)
+    if unsaid := [text for text in seen if text not in said]:
         write_json(out / DOUBTS, {"doubts": unsaid})
-    return doubted(out)
+    return [*said, *unsaid]
 
 
 def _times(out: Path, found: Sequence[Result]) -> tuple[pd.DataFrame, float]:

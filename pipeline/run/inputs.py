@@ -5,7 +5,6 @@ would be taken for that of the new file, and kept.
 """
 
 import hashlib
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -87,11 +86,11 @@ def contents_of(files: Sequence[Mapping[str, Any]]) -> str:
     return hashlib.sha256(repr(rows).encode()).hexdigest()[:16]
 
 
-def other_file(case: Case, known: Sequence[Mapping[str, Any]], since: float = math.inf) -> str:
+def other_file(case: Case, known: Sequence[Mapping[str, Any]], since: float) -> str:
     """Which file of a case is not the one that ``known`` describes, its key and path; empty where all are.
 
     A large file in the same place, of the same size and not changed ``since`` (seconds from 1970, when ``known`` was
-    written; never asked by default), is the same; any other is hashed.
+    written), is the same; any other is hashed.
     """
     rows = {str(row.get("key")): row for row in known}
     for key, path in _named(case).items():
@@ -120,7 +119,12 @@ def _all_of(case: Case) -> Iterator[Path]:
     """Every file that is read for a case: folders with all that is in them, headers with what holds their voxels."""
     for path in dict.fromkeys(_named(case).values()):
         if path.exists():
-            yield from (path, *(path.rglob("*") if path.is_dir() else parts_of(path)))
+            yield from _with_parts(path)
+
+
+def _with_parts(path: Path) -> tuple[Path, ...]:
+    """A folder and all that is in it, or a file and what belongs to it."""
+    return (path, *(path.rglob("*") if path.is_dir() else parts_of(path)))
 
 
 def _state(path: Path) -> State | None:
@@ -134,9 +138,8 @@ def _state(path: Path) -> State | None:
 
 def _changed(path: Path) -> float:
     """When a file, or any of a folder or behind a header, was last written or put in its place, seconds from 1970."""
-    files = (path, *(path.rglob("*") if path.is_dir() else parts_of(path)))
-    times = [stat for file in files if file.exists() and (stat := file.stat())]
-    return max((max(stat.st_mtime, stat.st_ctime) for stat in times), default=0.0)
+    stats = [file.stat() for file in _with_parts(path) if file.exists()]
+    return max((max(stat.st_mtime, stat.st_ctime) for stat in stats), default=0.0)
 
 
 def _size(path: Path) -> int:

@@ -18,10 +18,7 @@ from pipeline.run.results import Result, found_results, lost, untold
 from pipeline.run.stages.known import UP_TO_TRACE
 from reports import tables
 from reports.case_files import counted, find_cases
-from reports.schema import ERRORS, POINTS
-
-ALL = "(all)"
-"""Stands where the name of a case would."""
+from reports.schema import ALL, ERRORS, POINTS
 
 
 @dataclass(frozen=True, eq=False)

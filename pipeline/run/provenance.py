@@ -11,6 +11,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from pipeline.run import ledger
 from reports.records import read_json
 
 PACKAGES = ("numpy", "scipy", "scikit-image", "SimpleITK", "pandas", "h5py", "matplotlib", "numba", "pydantic")
@@ -76,6 +77,6 @@ def this_run() -> dict[str, Any]:
 def written_at(folder: Path) -> float:
     """When the files of a case were written, seconds from 1970; 0 where nothing tells."""
     try:
-        return datetime.fromisoformat(str(read_json(folder / "provenance.json").get("started", ""))).timestamp()
+        return datetime.fromisoformat(str(read_json(folder / ledger.PROVENANCE).get("started", ""))).timestamp()
     except ValueError:
         return 0.0

@@ -43,12 +43,14 @@ def opened(
     spacing = np.asarray(grid.spacing_mm)
     voxel, most = float(spacing.min()), float(np.max(grid.values))
     limit, allowed = OUTSIDE_VOXELS * voxel, may_lie_outside_mm(voxel, stiffness_N_mm2)
+    _, pressed = _outside(grid, curves, limit)
+    if not pressed:
+        return lumen
     links, said = _outside(grid, curves, allowed)
     if not said:
-        _, pressed = _outside(grid, curves, limit)
         why = f"no further than a wall of {stiffness_N_mm2:g} N/mm² yields, and it was not opened"
-        text = f"{_told(pressed, limit)}: {why}; look whether vessel is missing there" if pressed else ""
-        return replace(lumen, warnings=(*lumen.warnings, text)) if text else lumen
+        text = f"{_told(pressed, limit)}: {why}; look whether vessel is missing there"
+        return replace(lumen, warnings=(*lumen.warnings, text))
     first, last = (np.concatenate(ends) * spacing for ends in zip(*links, strict=True))
     values, radius = np.array(grid.values), np.full(len(first), radius_mm + ROOM_VOXELS * voxel)
     cones(first, last, radius, radius, spacing, most, values)

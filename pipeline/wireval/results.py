@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NoReturn
 
+import numpy as np
 import pandas as pd
 
 from pipeline.run.gate import gate
@@ -124,16 +125,13 @@ def _tables_of_others(found: Results, results: Sequence[Result]) -> str:
 
 
 def _alike(row: Mapping[Any, Any], other: Mapping[str, Any]) -> bool:
-    """Whether the numbers that both rows of a summary have are the same, as far as a table has them."""
-    numbers = [column.name for column in SUMMARY if column.kind != "text" and column.name in other]
-    return all(_same(row.get(name), other[name]) for name in numbers)
-
-
-def _same(one: float | None, other: float | None) -> bool:
-    """Whether two numbers are the same as far as a table has them, or both none."""
-    if one is None or other is None or math.isnan(one) or math.isnan(other):
-        return (one is None or math.isnan(one)) == (other is None or math.isnan(other))
-    return math.isclose(one, other, rel_tol=1e-6)
+    """Whether the numbers that both rows of a summary have are the same, as far as a table has them; none is none."""
+    names = [column.name for column in SUMMARY if column.kind != "text" and column.name in other]
+    one, two = (
+        pd.array([of.get(name) for name in names], dtype="Float64").to_numpy(float, na_value=math.nan)
+        for of in (row, other)
+    )
+    return bool(np.allclose(one, two, rtol=1e-6, atol=0.0, equal_nan=True))
 
 
 def read_run(out: Path, gates: Sequence[str] = ()) -> Results:

@@ -10,10 +10,10 @@ from reports.colours import SIMULATED, TRUE
 from reports.figures._drawing import Drawing, lattice, legend, plain
 from reports.figures._style import GREY, Look
 from reports.figures.run import RunFiles
+from reports.schema import ALL
 from reports.sweep import UNCHANGED
 from reports.tables import has
 
-POOLED = "(all)"  # the case of the rows over all cases
 _LOG_FROM_RATIO = 5.0
 _STYLES: tuple[tuple[str, str, Look], ...] = (
     ("rms_mm", "to the traced wire", {"color": SIMULATED, "marker": "o"}),
@@ -52,7 +52,7 @@ def with_unchanged(sweep: pd.DataFrame) -> pd.DataFrame:
 
 def _panel(axes: Axes, rows: pd.DataFrame) -> None:
     rows = rows.assign(place=_value_axis(axes, rows["value"])).sort_values("place")
-    pooled = rows["case"] == (POOLED if (rows["case"] == POOLED).any() else rows["case"].iloc[0])
+    pooled = rows["case"] == (ALL if (rows["case"] == ALL).any() else rows["case"].iloc[0])
     for _, one in rows[~pooled].groupby("case"):
         axes.plot(one["place"], one["rms_mm"], color=GREY, linewidth=0.6, alpha=0.7)
     whole = rows[pooled]

@@ -288,9 +288,9 @@ def test_a_kept_case_is_asked_for_what_is_stated_behind_its_parameters_and_for_t
     manifest.write_text(text.replace("stiffness_N_mm2 = 7.0", "stiffness_N_mm2 = 8.0"), encoding="utf-8")
     assert stated(read_manifest(manifest).cases[1]) != stated(case)
     known = described(made)
-    assert other_file(case, known) == ""
+    assert other_file(case, known, 0.0) == ""
     (study / "p.toml").write_text((study / "p.toml").read_text().replace("0.03", "0.04"), encoding="utf-8")
-    assert other_file(case, known) == f"parameters, now {study / 'p.toml'}"
+    assert other_file(case, known, 0.0) == f"parameters, now {study / 'p.toml'}"
 
 
 def test_cases_of_different_friction_are_not_calibrated_together(study, capsys):

@@ -7,6 +7,7 @@ import shutil
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 
@@ -283,6 +284,10 @@ def test_tables_of_one_shard_are_not_those_of_all(study: Path, tmp_path: Path) -
     assert not found.ok
     main(["report", str(out), "--overview"])
     assert not wireval.read_results(out).other_tables
+    rows = pd.read_csv(out / "summary.csv")
+    rows.assign(frames_ok=np.nan).to_csv(out / "summary.csv", index=False)
+    with pytest.warns(UserWarning, match=r"are not of the cases beside them \(a, b\)"):
+        assert not wireval.read_results(out).ok, "none is no number, and was a traceback"
 
 
 def test_what_is_doubtful_among_cases_of_several_shards_is_found_by_report(

@@ -67,7 +67,7 @@ def room_mm(wall: VesselWall, points_mm: Array, radius_mm: float) -> Array:
     return room
 
 
-def deep_in_itself_mm(catheter: OverWire | None, frame: Frame, wire: Solution) -> float:
+def deep_in_itself_mm(catheter: OverWire, frame: Frame, wire: Solution) -> float:
     """How deep a catheter over a wire lies in itself, mm; the wire beyond its tip may touch it unseen."""
-    points = np.empty((0, 3)) if catheter is None else covered(frame, wire)
-    return self_overlap_mm(points, catheter.radius_mm) if catheter is not None and len(points) > 1 else 0.0
+    points = covered(frame, wire)
+    return self_overlap_mm(points, catheter.radius_mm) if len(points) > 1 else 0.0

@@ -124,7 +124,7 @@ def judged(frame: Frame, wire: Solution, radius_mm: float, catheter: OverWire | 
         return frame.failed("simulate", FrameStatus.UNDER_RESOLVED, f"a joint is turned by {turn:.0f} degrees")
     if overlap > MOST_OVERLAP_RADII * radius_mm:
         return frame.failed("simulate", FrameStatus.SELF_CONTACT, f"the wire lies {overlap:.2f} mm deep in itself")
-    overlap = deep_in_itself_mm(catheter, frame, wire)
+    overlap = 0.0 if catheter is None else deep_in_itself_mm(catheter, frame, wire)
     if catheter is not None and overlap > MOST_OVERLAP_RADII * catheter.radius_mm:
         what = f"the catheter of radius_mm = {catheter.radius_mm:g} lies {overlap:.2f} mm deep in itself"
         return frame.failed("simulate", FrameStatus.SELF_CONTACT, what)
