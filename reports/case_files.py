@@ -233,11 +233,17 @@ def doubted(out_dir: Path) -> list[str]:
 
 
 def runs_in(out_dir: Path) -> list[dict[str, Any]]:
-    """What the runs into a folder say of themselves; nothing where that is damaged, which ``wireval run`` refuses."""
+    """What the runs into a folder say of themselves, the earliest first; nothing where that is damaged, which
+    ``wireval run`` refuses.
+    """
     try:
-        return [read_json(path) for path in sorted(out_dir.glob("run*.json"))]
+        return [read_json(path) for path in sorted(sorted(out_dir.glob("run*.json")), key=_began)]
     except ValueError:
         return []
+
+
+def _began(run: Path) -> str:
+    return str(read_json(run.with_name(run.name.replace("run", "provenance"))).get("started", ""))
 
 
 def _folders(out_dir: Path, named: bool) -> list[Path]:

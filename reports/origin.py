@@ -72,7 +72,7 @@ def _of_other_settings(found: Mapping[Path, Mapping[str, Mapping[str, Any]]]) ->
 
 
 def _of_other_manifests(found: Mapping[Path, Mapping[str, Mapping[str, Any]]]) -> str:
-    """The sentence on cases that a run into their folder states otherwise than the run that computed them.
+    """The sentence on cases that the latest run into their folder states otherwise than the run that computed them.
 
     Runs of an earlier version do not say what they state: those of several manifests may state anything.
     """
@@ -82,12 +82,14 @@ def _of_other_manifests(found: Mapping[Path, Mapping[str, Mapping[str, Any]]]) -
         if len(manifests_in(run for run in runs if "stated" not in run)) > 1:
             apart |= results.keys()
         own = {name: result["stated"] for name, result in results.items() if result.get("stated")}
-        apart |= {name for run in runs for name, text in run.get("stated", {}).items() if own.get(name, text) != text}
+        latest = {name: text for run in runs for name, text in run.get("stated", {}).items()}
+        apart |= {name for name, text in latest.items() if own.get(name, text) != text}
     if not apart:
         return ""
     what = f"Nothing is pooled: {listed(sorted(apart))} was computed from another manifest, which stated it otherwise"
     what = what if len(apart) == 1 else what.replace(" was ", " were ").replace(" it ", " them ")
-    do = "run all cases of one manifest (--resume, without --only and --shard), or keep them in folders of their own"
+    do = "run them again (--resume, without --only; their shards, where there are shards)"
+    do += ", or keep them in folders of their own"
     return f"{what} than a run into this folder; {do}."
 
 

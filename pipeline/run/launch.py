@@ -8,7 +8,7 @@ agreement that no parameter moves is suspicious.
 import gc
 import math
 import sys
-from collections.abc import Iterator, Mapping, Sequence, Set
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass, replace
 from glob import escape
@@ -169,8 +169,6 @@ def launch(plan: Plan) -> tuple[Totals, Path]:
         _remove_others(out, info["manifest_sha256"])
     elif not plan.shard and not plan.left_out:
         _remove_records(out, info["manifest_sha256"])
-    if not plan.shard:  # nobody else writes into this folder
-        _forget_stated(out, plan.ids, but=name)
     _refuse(plan)
     run_cases(plan, [*plan.jobs, *plan.sweep_jobs])
     if removed := write_sweep(out, found_heads(out), earlier=swept):  # points of other shards so far included
@@ -205,15 +203,6 @@ def _remove_records(out: Path, manifest: str) -> None:
         with suppress(ValueError):
             if read_json(path).get("manifest_sha256") != manifest:
                 path.unlink()
-
-
-def _forget_stated(out: Path, cases: Set[str], *, but: str) -> None:
-    """Take back what records of earlier runs state of cases that are computed again. but : the name of this run's."""
-    for path in out.glob("run*.json"):
-        with suppress(ValueError):
-            known = read_json(path)
-            if path.name != but and cases & known.get("stated", {}).keys():
-                write_json(path, known | {"stated": {n: v for n, v in known["stated"].items() if n not in cases}})
 
 
 def _remove_others(out: Path, manifest: str) -> None:

@@ -227,10 +227,34 @@ def test_shards_of_manifests_that_state_a_case_otherwise_are_not_pooled(
     out = of_two_manifests(study, tmp_path)
     capsys.readouterr()
     assert main(["report", str(out), "--overview"]) == 1
-    said = "Nothing is pooled: a, b were computed from another manifest, which stated them otherwise"
+    began(out, "1-2", "2026-01-01"), began(out, "2-2", "2026-01-02")
+    said = "Nothing is pooled: a was computed from another manifest, which stated it otherwise"
     assert said in capsys.readouterr().out
     assert said in (out / "index.html").read_text(encoding="utf-8")
     assert not wireval.read_results(out).ok
+
+
+def began(out: Path, shard: str, day: str) -> None:
+    """Say that a shard's run began on a day: two short ones begin within a second."""
+    path = out / f"provenance.{shard}.json"
+    path.write_text(json.dumps(json.loads(path.read_text(encoding="utf-8")) | {"started": day}), encoding="utf-8")
+
+
+def test_of_shards_merged_again_one_by_one_those_that_are_left_are_named(study: Path, tmp_path: Path) -> None:
+    """The record of the other shard, of an older manifest, made a case that was computed anew the one to blame."""
+    out = tmp_path / "out"
+
+    def merged(shard: str, day: str) -> str:
+        run(study, tmp_path / day, "--shard", f"{shard}/2")
+        began(tmp_path / day, f"{shard}-2", day)
+        shutil.copytree(tmp_path / day, out, dirs_exist_ok=True)
+        return why_not_pooled(out)
+
+    assert not merged("1", "2026-01-01")
+    assert not merged("2", "2026-01-02")
+    with_a_thinner_wire(study)
+    assert "Nothing is pooled: b was computed from another manifest" in merged("1", "2026-01-03")
+    assert not merged("2", "2026-01-04")
 
 
 def test_a_run_that_was_ended_leaves_no_tables_of_an_earlier_one(
