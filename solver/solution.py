@@ -27,8 +27,8 @@ class Status(Enum):
     FOLDED = "the wire folded at a joint (turned by more than 90 degrees); use shorter segments or smaller steps"
     LEFT_GRID = "the wire left the wall's grid; give a larger grid, or check entry point and direction"
     THROUGH_WALL = (
-        "the wire would come through the wall into another vessel; check entry and lumen (vessels that touch), raise "
-        "the wall's stiffness or shorten solver.segment_mm"
+        "the wire would come through the wall into another vessel; check entry and lumen (vessels that touch, a piece "
+        "that is missing), raise the wall's stiffness or shorten solver.segment_mm"
     )
     ENTRY_OUTSIDE = "the entry point lies outside the lumen; check entry_mm and the registration of the wall"
     ENTRY_IN_SEPTUM = (
