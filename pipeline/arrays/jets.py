@@ -98,9 +98,47 @@ def jets_at(field: Blurred, points: NDArray[Any]) -> NDArray[Any]:
     return result
 
 
+@kernel
+def _shares(x: float, h: float, sigma: float, n: int, w: NDArray[Any]) -> tuple[int, int]:
+    """The weights of ``_weights`` for the value alone."""
+    s = max(sigma, 0.6 * h)
+    first, stop = nodes_near(x, x, REACH * s, h, n)
+    stop = min(stop, first + w.shape[0])
+    total = 0.0
+    for i in range(first, stop):
+        d = (i * h - x) / s
+        w[i - first] = np.exp(-0.5 * d * d)
+        total += w[i - first]
+    if total > 0.0:
+        for i in range(stop - first):
+            w[i] /= total
+    return first, stop
+
+
+@entry_point
+def _values(field: Blurred, points: NDArray[Any]) -> NDArray[Any]:
+    """What ``jets_at`` has in its first column: without derivatives that takes half as long."""
+    grey, spacing, sigma = field
+    a, b, c = np.empty(WIDEST), np.empty(WIDEST), np.empty(WIDEST)
+    result = np.zeros(points.shape[0])
+    for n in range(points.shape[0]):
+        i0, i1 = _shares(points[n, 0], spacing[0], sigma, grey.shape[0], a)
+        j0, j1 = _shares(points[n, 1], spacing[1], sigma, grey.shape[1], b)
+        k0, k1 = _shares(points[n, 2], spacing[2], sigma, grey.shape[2], c)
+        for i in range(i0, i1):
+            plane = 0.0
+            for j in range(j0, j1):
+                row = 0.0
+                for k in range(k0, k1):
+                    row += c[k - k0] * grey[i, j, k]
+                plane += b[j - j0] * row
+            result[n] += a[i - i0] * plane
+    return result
+
+
 def values_at(field: Blurred, points: NDArray[Any]) -> NDArray[Any]:
     """The blurred lattice (n,) at points (n, 3)."""
-    return jets_at(field, np.ascontiguousarray(points))[:, 0].copy()
+    return np.asarray(_values(field, np.ascontiguousarray(points)))
 
 
 def gaussian_taps(sigma_voxel: float) -> NDArray[np.float32]:

@@ -9,7 +9,7 @@ import pytest
 from scipy import ndimage
 from scipy.stats import ncx2
 
-from pipeline.arrays.jets import Blurred, jet, ridge_frame, ridge_step
+from pipeline.arrays.jets import Blurred, jet, jets_at, ridge_frame, ridge_step, values_at
 from pipeline.arrays.spare import Spare
 from pipeline.segment._kernels.wall import hessian, value_gradient
 from pipeline.segment.blurred import blur_of_wall, half_level_offset
@@ -40,6 +40,15 @@ def test_jets_at_nodes_are_gaussian_derivatives():
     for n, order in enumerate(orders):
         expected = ndimage.gaussian_filter(grey.astype(float), 1.2, order=order, truncate=2.9)[7, 8, 8]
         assert out[n] == pytest.approx(expected / 0.5 ** sum(order), rel=0.02, abs=5e-3)
+
+
+def test_values_alone_are_those_that_have_derivatives():
+    """To the last bit, near and beyond the border, too: which of the two is asked for moves no curve."""
+    rng = np.random.default_rng(7)
+    for kind in (np.float32, np.int16):
+        field = Blurred((300 * rng.normal(size=(12, 14, 16))).astype(kind), np.array([0.3, 0.3, 0.4]), 0.3)
+        points = rng.uniform(-1.0, 7.0, (200, 3))
+        np.testing.assert_array_equal(values_at(field, points), jets_at(field, points)[:, 0])
 
 
 def _equations(grey, spacing, samples, controls, tint, sigma):

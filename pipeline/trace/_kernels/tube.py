@@ -213,6 +213,28 @@ def _rows(line: Line, slot: NDArray[Any], spacing: NDArray[Any], blob: Blob, tot
     return rows
 
 
+@kernel
+def _add_products(
+    normal: NDArray[Any], right: NDArray[Any], column: NDArray[Any], row: NDArray[Any], w: float, r: float
+) -> None:
+    """Add a voxel's products to the lower half: both halves together take twice as long."""
+    size, run = column.shape[0], 1
+    while run < size and column[run] == column[0] + run:
+        run += 1
+    ordered = True
+    for a in range(run, size):
+        ordered = ordered and column[a] > column[a - 1]
+    for a in range(size):
+        ja, at = w * row[a], column[a]
+        right[at] += ja * r
+        # the columns of one strand are neighbours in memory, several are added at a time: 0.8 of the time
+        together, line = min(run, a + 1) if ordered else 0, normal[at, column[0] :]
+        for b in range(together):
+            line[b] += ja * row[b]
+        for b in range(together, a + 1):
+            normal[max(at, column[b]), min(at, column[b])] += ja * row[b]
+
+
 @entry_point
 def normal_equations(
     grey: NDArray[Any], spacing: NDArray[Any], claim: Claim, line: Line, blob: Blob, controls: int, tints: int
@@ -245,9 +267,5 @@ def normal_equations(
         column[n], row[n] = 3 * controls + tints, by_sigma[s]
         column[n + 1], row[n + 1] = 3 * controls + tints + 1, 1.0
         total += w * r * r
-        for a in range(n + 2):
-            ja = w * row[a]
-            right[column[a]] += ja * r
-            for b in range(a + 1):  # the lower half: both halves together take twice as long
-                normal[max(column[a], column[b]), min(column[a], column[b])] += ja * row[b]
+        _add_products(normal, right, column[: n + 2], row, w, r)
     return Equations(normal + np.tril(normal, -1).T, right, residual, total)
