@@ -30,11 +30,14 @@ from tests.studies.seeing.render import Lattice, arc_of
 from tests.studies.seeing.scenes import CASES, Draft
 from tests.studies.seeing.table import look
 
+LARGE = ("0.9 mm wire, 0.1 mm voxels", "layered filling", "wire out of the round field of view")
+"""Of which one scene takes as long as ten others; ``tests.numbers.traces`` keeps what comes of the last two."""
+
 
 def further_ones_slow(rows):
     """The first scene of each case for every commit, further ones, which were wrong once, by ``make study``."""
     cases = [case for case, *_ in rows]
-    again = [case in cases[:n] for n, case in enumerate(cases)]
+    again = [case in LARGE or case in cases[:n] for n, case in enumerate(cases)]
     return [pytest.param(*row, marks=[pytest.mark.slow] * slow) for row, slow in zip(rows, again, strict=True)]
 
 

@@ -59,7 +59,7 @@ def places(texts: list[str]) -> np.ndarray:
     return np.array([text.split("scan at ")[1].split(" mm")[0].split(", ") for text in texts], float)
 
 
-@pytest.mark.parametrize("seed", [0, 1, 2])
+@pytest.mark.parametrize("seed", [0, *(pytest.param(n, marks=pytest.mark.slow) for n in (1, 2))])
 @pytest.mark.parametrize(
     ("radius", "width", "degrees", "noise"),
     [(1.6, 2.4, 0, 100), (1.6, 2.4, 30, 100), (1.6, 2.4, 45, 100), (1.6, 3.5, 0, 200), (1.6, 3.5, 30, 100),

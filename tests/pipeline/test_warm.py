@@ -38,7 +38,7 @@ def folder(tmp_path_factory) -> Path:
     return folder
 
 
-@pytest.mark.parametrize("reference", [True, False])
+@pytest.mark.parametrize("reference", [True, pytest.param(False, marks=pytest.mark.slow)])
 def test_a_tiny_wire_loads_what_frames_need(folder, reference):
     manifest = folder / "study" / "manifest.toml"
     if not reference:
