@@ -43,7 +43,7 @@ PLANNED = (
 )
 
 
-def render_calibration(out: Path, embed: bool = False) -> Path:
+def render_calibration(out: Path) -> Path:
     """Draw the figures and write calibration.html into a folder that holds calibration.json; returns its path."""
     record = read_json(out / "calibration.json")
     rows = record["estimates"]
@@ -57,7 +57,7 @@ def render_calibration(out: Path, embed: bool = False) -> Path:
         "gained": gained(record["frames"]),
         "starts": [(number(roll), number(value)) for roll, value in record["starts"]],
         "estimates": grid(table, COLUMNS, bad=[not row["seen"] for row in rows], nothing=NOTHING),
-        "sections": draw_sections("calibration", record, out, embed),
+        "sections": draw_sections("calibration", record, out, embed=False),
         "warnings": record.get("warnings", ()),
         "notes": record["notes"],
         "provenance": list(flatten(record["provenance"])),

@@ -5,7 +5,7 @@ the trace's and the segments' make u_val; an error within 2 u_val says nothing o
 """
 
 from pipeline.budget.ensemble import Scene, replayed
-from pipeline.budget.frame import Budget, Seen, frame_budget
+from pipeline.budget.frame import Budget, FrameSample, frame_budget
 from pipeline.budget.inputs import SOURCES, Nominal, Sigmas, alone, drawn, sigmas_of
 from pipeline.budget.joint import coefficients, rank_of_ends
 from pipeline.budget.shapes import releases
@@ -13,9 +13,9 @@ from pipeline.budget.shapes import releases
 __all__ = [
     "SOURCES",
     "Budget",
+    "FrameSample",
     "Nominal",
     "Scene",
-    "Seen",
     "Sigmas",
     "alone",
     "coefficients",

@@ -14,7 +14,7 @@ FEWEST = 8
 """Fewest members at rest for a frame to have a budget."""
 
 
-class Seen(NamedTuple):
+class FrameSample(NamedTuple):
     """The nominal wire of a frame, and the traced one.
 
     arc_mm (n,), nominal_mm (n, 3) : where the wires are looked at.     curve_mm (m, 3), foot_arc_mm (n,) : the traced
@@ -54,7 +54,7 @@ class Budget:
     released: str = ""
 
 
-def frame_budget(wires: Array, seen: Seen) -> Budget | None:
+def frame_budget(wires: Array, seen: FrameSample) -> Budget | None:
     """The budget of a frame from an ensemble (members, n, 3); None where too few of its members came to rest."""
     wires = wires[np.isfinite(wires).all(axis=(1, 2))]
     if len(wires) < FEWEST:

@@ -13,10 +13,10 @@ from numpy.polynomial.legendre import legvander
 from scipy.linalg import cho_factor, cho_solve
 
 from pipeline.arrays.polyline import at_arc
-from pipeline.budget.frame import FEWEST, Seen
+from pipeline.budget.frame import FEWEST, FrameSample
 from pipeline.budget.verdict import axes_across
 from pipeline.model import Array
-from pipeline.simulate.evidence import Sight, covariance_of_traces
+from pipeline.simulate.evidence import TraceSamples, covariance_of_traces
 
 DISTAL_MM, DEGREE = 20.0, 3
 SHRUNK = 0.3
@@ -24,10 +24,12 @@ SHRUNK = 0.3
 NOTHING_MM2 = 1e-12
 
 
-def coefficients(wires: Array, seen: Seen, sight: Sight, voxel_mm: float, rng: np.random.Generator) -> Array | None:
+def coefficients(
+    wires: Array, seen: FrameSample, trace: TraceSamples, voxel_mm: float, rng: np.random.Generator
+) -> Array | None:
     """Legendre coefficients (members + 1, 2 (DEGREE + 1)) of a frame's wires (members, n, 3), the real one last.
 
-    sight : the trace's error at all points of the wire.     None where nothing was traced or the wire is too short.
+    trace : the trace's error at all points of the wire.     None where nothing was traced or the wire is too short.
     """
     arc, nominal, curve, foot = seen[:4]
     if curve is None or foot is None:
@@ -37,7 +39,7 @@ def coefficients(wires: Array, seen: Seen, sight: Sight, voxel_mm: float, rng: n
         return None
     axes = axes_across(curve, foot)[end]
     drawn = np.einsum("nai,mni->mna", axes, wires[:, end] - nominal[end])
-    last = Sight(sight.index, sight.arc_mm[end], sight.points_mm[end], sight.sigma_mm[end], sight.knot_mm)
+    last = TraceSamples(trace.index, trace.arc_mm[end], trace.points_mm[end], trace.sigma_mm[end], trace.knot_mm)
     noise = covariance_of_traces([last], voxel_mm)
     root = np.linalg.cholesky(noise + NOTHING_MM2 * np.eye(len(noise)))
     drawn += np.einsum("nk,mka->mna", root, rng.standard_normal(drawn.shape))

@@ -14,7 +14,7 @@ from pipeline.calibrate.search import FIRST_FRICTION
 from pipeline.calibrate.trials import OWN, Point, Trial, replayed
 from pipeline.calibrate.unknowns import FRICTION, Unknown
 from pipeline.model import Curve
-from pipeline.simulate.clamp import Seen
+from pipeline.simulate.clamp import TracedFrame
 from pipeline.simulate.config import SolverConfig
 
 TRACE_VOXELS, TIP_VOXELS = 0.07, 0.2
@@ -39,7 +39,7 @@ def straight_to(trial: Trial, depths_mm: Sequence[float], rolls_deg: Sequence[fl
     seen = []
     for n, (depth, roll) in enumerate(zip(depths_mm, rolls_deg, strict=True)):
         points = trial.given.entry_mm + np.linspace(0.0, depth, 2)[:, None] * trial.given.direction
-        seen.append(Seen(n, Curve(points, np.zeros(2)), roll))
+        seen.append(TracedFrame(n, Curve(points, np.zeros(2)), roll))
     return replace(trial, seen=tuple(seen))
 
 

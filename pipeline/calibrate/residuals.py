@@ -15,8 +15,8 @@ from scipy.linalg import cholesky, solve_triangular
 
 from pipeline.arrays.polyline import at_arc
 from pipeline.calibrate.trials import Point, Trial, depths_at
-from pipeline.model import Array, arc_length
-from pipeline.simulate.evidence import Sight, covariance_of_traces
+from pipeline.model import Array
+from pipeline.simulate.evidence import TraceSamples, covariance_of_traces
 from solver import Solution
 
 FIRST_MM, LAST_MM, EVERY_MM = 0.5, 0.5, 1.5  # the trace's own ends are left out
@@ -53,35 +53,32 @@ class Evidence:
     _roots: dict[str, Any] = field(default_factory=dict)
 
     @cached_property
-    def sights(self) -> list[Sight]:
+    def traces(self) -> list[TraceSamples]:
         """The points of every frame's trace that are fitted."""
-        found = []
-        for frame in self.trial.seen:
-            arc = np.arange(FIRST_MM, max(frame.curve.length_mm - LAST_MM, FIRST_MM + 1e-6), EVERY_MM)
-            sigma = np.interp(arc, arc_length(frame.curve.points_mm), frame.curve.sigma_mm)
-            knot = frame.curve.levels.get("knot_mm", np.nan)
-            found.append(Sight(frame.index, arc, at_arc(frame.curve.points_mm, arc), sigma, knot))
-        return found
+        seen = self.trial.seen
+        stops = [max(frame.curve.length_mm - LAST_MM, FIRST_MM + 1e-6) for frame in seen]
+        arcs = [np.arange(FIRST_MM, stop, EVERY_MM) for stop in stops]
+        return [TraceSamples.of(frame.index, frame.curve, arc) for frame, arc in zip(seen, arcs, strict=True)]
 
     @cached_property
     def counts(self) -> NDArray[np.int64]:
         """Number of points of every frame (frames,)."""
-        return np.array([len(sight.arc_mm) for sight in self.sights], dtype=np.int64)
+        return np.array([len(trace.arc_mm) for trace in self.traces], dtype=np.int64)
 
     @cached_property
     def stated(self) -> bool:
         """Whether there is a trace that states its standard deviation at all points."""
-        return any(bool(np.isfinite(sight.sigma_mm).all()) for sight in self.sights)
+        return any(bool(np.isfinite(trace.sigma_mm).all()) for trace in self.traces)
 
     @cached_property
     def traced(self) -> Array:
         """Covariance (points, points), mm^2, of one component: the errors of the traces."""
-        return covariance_of_traces(self.sights, self.trial.voxel_mm)
+        return covariance_of_traces(self.traces, self.trial.voxel_mm)
 
     @cached_property
     def modelled(self) -> Array:
         """Covariance (points, points), mm^2, of one component: the errors of wall and model, without the traces'."""
-        arc = np.concatenate([sight.arc_mm for sight in self.sights])
+        arc = np.concatenate([trace.arc_mm for trace in self.traces])
         bell = np.exp(-0.5 * ((arc[:, None] - arc[None, :]) / WALL_BELL_MM) ** 2)
         wall = (WALL_VOXELS * self.trial.voxel_mm) ** 2 * bell
         frame = np.repeat(np.arange(len(self.counts)), self.counts)
@@ -101,14 +98,14 @@ class Evidence:
         """Residuals: traces minus wires, across the wires, and measured minus simulated push forces."""
         across, push, rests = [], [], np.zeros(len(wires), bool)
         depths = depths_at(self.trial, point)
-        for i, (sight, wire, depth) in enumerate(zip(self.sights, wires, depths, strict=True)):
+        for i, (trace, wire, depth) in enumerate(zip(self.traces, wires, depths, strict=True)):
             rests[i] = wire.converged and len(wire.joints_mm) > 2
             if not rests[i]:
-                across.append(np.full((len(sight.arc_mm), 3), LOST_MM / np.sqrt(3.0)))
+                across.append(np.full((len(trace.arc_mm), 3), LOST_MM / np.sqrt(3.0)))
                 push.append(np.nan)
                 continue
             here, tangent = along(wire, self._arc(i, depth))
-            away = sight.points_mm - here
+            away = trace.points_mm - here
             across.append(away - np.sum(away * tangent, axis=1)[:, None] * tangent)
             push.append(wire.push_force_N)
         force = np.array(push) if self.trial.force_N is None else self.trial.force_N - np.array(push)
@@ -123,7 +120,7 @@ class Evidence:
         depths = zip(depths_at(self.trial, points[0]), depths_at(self.trial, points[1]), strict=True)
         change, push = [], np.zeros(len(wires))
         for i, (a, b, (here, there)) in enumerate(zip(wires, moved, depths, strict=True)):
-            n = len(self.sights[i].arc_mm)
+            n = len(self.traces[i].arc_mm)
             if not (a.converged and b.converged and min(len(a.joints_mm), len(b.joints_mm)) > 2):
                 change.append(np.zeros((n, 3)))
                 continue
@@ -137,7 +134,7 @@ class Evidence:
 
     def _arc(self, frame: int, depth_mm: float) -> Array:
         """Where the points of a frame are on a wire of some depth: as far from the tip as on the trace."""
-        return np.asarray(self.sights[frame].arc_mm + depth_mm - self.trial.seen[frame].curve.length_mm)
+        return np.asarray(self.traces[frame].arc_mm + depth_mm - self.trial.seen[frame].curve.length_mm)
 
     def surprise(self, rows: Rows) -> Array:
         """Mean squares (frames,) of each frame's residuals by its own covariance, about 1 where all is as expected."""

@@ -8,7 +8,7 @@ import numpy as np
 from pipeline.calibrate.unknowns import FRICTION, MOST_CURVED, REST, ROLL, bent, wall_factor
 from pipeline.model import Array, Clamp, OverWire, Wall, Wire
 from pipeline.simulate import inserted
-from pipeline.simulate.clamp import STEP_MM, STEP_RAD, TIP_VOXELS, Prior, Seen, depth_from, moved
+from pipeline.simulate.clamp import STEP_MM, STEP_RAD, TIP_VOXELS, Prior, TracedFrame, depth_from, moved
 from pipeline.simulate.config import SolverConfig
 from pipeline.simulate.resolution import lengths_mm
 from solver import Insertion, Insertions, Solution, VesselWall
@@ -37,7 +37,7 @@ class Trial:
     wall: Wall
     given: Clamp
     prior: Prior
-    seen: tuple[Seen, ...]
+    seen: tuple[TracedFrame, ...]
     voxel_mm: float
     roll_free: bool = False
     catheter: OverWire | None = None

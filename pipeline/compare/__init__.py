@@ -8,7 +8,17 @@ import numpy as np
 from pipeline.arrays.polyline import at_arc, samples
 from pipeline.compare.branches import branches_of
 from pipeline.compare.config import CompareConfig
-from pipeline.compare.metrics import METRICS, Pair, Simulated, Way, measured, pair_of, point_to_curve, rms, scored
+from pipeline.compare.metrics import (
+    METRICS,
+    Pair,
+    Simulated,
+    VesselAxis,
+    measured,
+    pair_of,
+    point_to_curve,
+    rms,
+    scored,
+)
 from pipeline.model import Array, Curve, Lumen, arc_length
 
 __all__ = ["Comparison", "compare", "compare_truth", "point_to_curve", "rms"]
@@ -34,7 +44,7 @@ def compare(
     traced: Curve,
     lumen: Lumen,
     config: CompareConfig = CompareConfig(),
-    way: Way | None = None,
+    way: VesselAxis | None = None,
     ahead_mm: float = 0.0,
 ) -> Comparison:
     """Errors of one simulated wire against the traced one; refuses an empty curve with ValueError.
@@ -43,7 +53,9 @@ def compare(
     ahead_mm : how far the traced curve begins beyond the plane in which the wire does.
     """
     start = traced.points_mm[:1] if len(traced.points_mm) else np.zeros((1, 3))
-    pair = pair_of(simulated, traced, lumen, config, way or Way(None, branches_of(lumen.distance, start[0])), ahead_mm)
+    pair = pair_of(
+        simulated, traced, lumen, config, way or VesselAxis(None, branches_of(lumen.distance, start[0])), ahead_mm
+    )
     values = {name: measured(name, metric, pair) for name, metric in METRICS.items()}
     return Comparison(**vars(pair), values=values)
 

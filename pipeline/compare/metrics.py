@@ -69,7 +69,7 @@ def point_to_curve(points: ArrayLike, curve: ArrayLike) -> tuple[Array, Array]:
 
 
 @dataclass(frozen=True, eq=False)
-class Way:
+class VesselAxis:
     """What is known of the vessel beside its wall: its axis (k, 3) to the deepest tip, or None, and its branches."""
 
     axis_mm: Array | None
@@ -98,7 +98,7 @@ class Pair:
     back_mm: Array
     equal_mm: Array
     lumen: Lumen
-    way: Way
+    way: VesselAxis
 
     @property
     def by_arc_mm(self) -> Array:
@@ -121,7 +121,7 @@ def scored(arc_mm: Array, skip_mm: float) -> Array:
 
 
 def pair_of(
-    simulated: Simulated, traced: Curve, lumen: Lumen, config: CompareConfig, way: Way, ahead_mm: float = 0.0
+    simulated: Simulated, traced: Curve, lumen: Lumen, config: CompareConfig, way: VesselAxis, ahead_mm: float = 0.0
 ) -> Pair:
     """Sample both curves and measure their distances; ValueError where one of them is empty.
 

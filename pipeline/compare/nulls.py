@@ -14,7 +14,7 @@ import numpy as np
 from pipeline.arrays.polyline import at_arc, samples, smooth, to_length
 from pipeline.compare.branches import branches_of
 from pipeline.compare.config import CompareConfig
-from pipeline.compare.metrics import Way, point_to_curve, rms, scored
+from pipeline.compare.metrics import VesselAxis, point_to_curve, rms, scored
 from pipeline.compare.pinned import pinned
 from pipeline.compare.taut import pulled_tight
 from pipeline.compare.ways import cheapest_ways, nearest
@@ -79,9 +79,9 @@ class Clues:
         return None if path is None else smooth(path, 0.5 * float(self.room.spacing_mm.mean()))
 
     @cached_property
-    def way(self) -> Way:
+    def way(self) -> VesselAxis:
         """The vessel's axis and its branches around the traced wires."""
-        return Way(self.centreline, branches_of(self.room, self.clamp.entry_mm))
+        return VesselAxis(self.centreline, branches_of(self.room, self.clamp.entry_mm))
 
     def known_ways(self) -> None:
         """Compute once what all frames share but ``shortest``, before these are shared among processes."""
@@ -103,7 +103,7 @@ class Clues:
 
 
 @dataclass(frozen=True, eq=False)
-class Seen:
+class PredictorInputs:
     """What a predictor may see beside the depth.
 
     previous_mm, following_mm : (n, 3) the last trusted trace before the frame, the first after it.     tip_mm : (3,)
@@ -116,7 +116,7 @@ class Seen:
     simulated: Mapping[str, Array] = field(default_factory=dict)
 
 
-Guess = Callable[[Clues, float, Seen], Array | None]
+Guess = Callable[[Clues, float, PredictorInputs], Array | None]
 """From the clues, a depth (mm) and what is seen to a wire (m, 3), or None."""
 
 
@@ -125,7 +125,7 @@ def of_path(path: Array | None, depth_mm: float) -> Array | None:
     return None if path is None or len(path) < 2 else to_length(path, depth_mm)
 
 
-def min_bending(clues: Clues, depth_mm: float, _seen: Seen = Seen()) -> Array | None:
+def min_bending(clues: Clues, depth_mm: float, _seen: PredictorInputs = PredictorInputs()) -> Array | None:
     """The curve of least bending in the lumen: a straight wire laid on the centreline and let go."""
     start = of_path(clues.centreline, depth_mm)
     if start is None:
@@ -143,7 +143,7 @@ def min_bending(clues: Clues, depth_mm: float, _seen: Seen = Seen()) -> Array | 
     return np.asarray(solution.joints_mm) if at_rest else None
 
 
-def to_this_tip(clues: Clues, depth_mm: float, seen: Seen) -> Array | None:
+def to_this_tip(clues: Clues, depth_mm: float, seen: PredictorInputs) -> Array | None:
     """The curve of least bending whose tip is held at the frame's own."""
     start = min_bending(clues, depth_mm)
     if start is None or seen.tip_mm is None:
@@ -151,7 +151,7 @@ def to_this_tip(clues: Clues, depth_mm: float, seen: Seen) -> Array | None:
     return pinned(clues.straight_wire, clues.hard_wall, clues.clamp, start, seen.tip_mm)
 
 
-def between(_: Clues, depth_mm: float, seen: Seen) -> Array | None:
+def between(_: Clues, depth_mm: float, seen: PredictorInputs) -> Array | None:
     """The mean, at equal arc length, of the frames before and after: it saw where the wire went."""
     sides = [of_path(curve, depth_mm) for curve in (seen.previous_mm, seen.following_mm)]
     arc = samples(depth_mm, 0.5)
@@ -191,7 +191,9 @@ def register(name: str, label: str, meaning: str, guess: Guess, told: str = "") 
     TOLD.update({name: told} if told else {})
 
 
-def score(clues: Clues, depth_mm: float, seen: Seen, curve_mm: Array, config: CompareConfig) -> dict[str, float]:
+def score(
+    clues: Clues, depth_mm: float, seen: PredictorInputs, curve_mm: Array, config: CompareConfig
+) -> dict[str, float]:
     """Root mean square distance (mm) of every predictor's wire from the traced curve, by the predictor's name.
 
     Wires are sampled where the simulated one is; a predictor that has no guess has no entry.

@@ -12,7 +12,7 @@ import numpy as np
 
 from pipeline.arrays.polyline import at_arc, resample, samples
 from pipeline.compare.config import CompareConfig
-from pipeline.compare.metrics import METRICS, Pair, Way, measured, point_to_curve, rms, scored
+from pipeline.compare.metrics import METRICS, Pair, VesselAxis, measured, point_to_curve, rms, scored
 from pipeline.model import Array, Lumen, arc_length
 
 FIT_FROM_MM, FIT_TO_MM = 40.0, 110.0
@@ -107,7 +107,7 @@ def counted(wire_mm: Array, fitted: bool, config: CompareConfig) -> Array:
     return arc[arc >= arc[-1] - FIT_FROM_MM - 1e-9] if fitted else arc
 
 
-def pair_in(screen: Screen, wire_mm: Array, fitted: bool, lumen: Lumen, way: Way, config: CompareConfig) -> Pair:
+def pair_in(screen: Screen, wire_mm: Array, fitted: bool, lumen: Lumen, way: VesselAxis, config: CompareConfig) -> Pair:
     """The wire and the polyline on the plane; arc lengths are those of the wire in space."""
     shift, arc = shift_of(screen, wire_mm, fitted), counted(wire_mm, fitted, config)
     whole, points = screen.flat(wire_mm) + shift, screen.flat(at_arc(wire_mm, arc)) + shift

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from scipy.cluster.hierarchy import DisjointSet
 
 from pipeline.compare import intervals
 from pipeline.compare.pooled import Scored, by_insertion, is_pooled, numbers, pooled, skill, squares_of, within
@@ -74,18 +75,14 @@ def _joined(cases: Sequence[tuple[str, str, Iterable[str]]]) -> dict[str, str]:
 
     cases : each with a label of its own and what it may have in common with others.
     """
-    above: dict[str, str] = {}
-    first: dict[str, str] = {}
-
-    def top(label: str) -> str:
-        while above.setdefault(label, label) != label:
-            label = above[label]
-        return label
-
+    sets: DisjointSet[tuple[str, bool]] = DisjointSet()
     for _, own, tokens in cases:
+        sets.add((own, True))
         for token in tokens:
-            above[top(own)] = top(first.setdefault(token, own))
-    return {case: top(own) for case, own, _ in cases}
+            sets.add((token, False))
+            sets.merge((own, True), (token, False))
+    label: dict[tuple[str, bool], str] = {}
+    return {case: label.setdefault(sets[own, True], own) for case, own, _ in cases}
 
 
 def shared_scans(results: Sequence[Result]) -> list[str]:

@@ -19,9 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.arrays.polyline import angle_deg, at_arc
-from pipeline.model import Array, Clamp, Curve, arc_length
+from pipeline.model import Array, Clamp, Curve
 from pipeline.simulate.departures import departed
-from pipeline.simulate.evidence import Sight, covariance_of, disagreeing, posterior
+from pipeline.simulate.evidence import TraceSamples, covariance_of, disagreeing, posterior
 from solver import Solution
 
 REACH_MM = 10.0
@@ -45,7 +45,7 @@ SNAPS = 3.0
 
 
 @dataclass(frozen=True)
-class Seen:
+class TracedFrame:
     """A frame that is fitted: its number, its trace, the base's roll and the catheter's tip."""
 
     index: int
@@ -67,7 +67,7 @@ class Prior:
         return np.array([self.sigma_mm] * 3 + [np.radians(self.direction_sigma_deg)] * 2)
 
 
-Replay = Callable[[Sequence[Clamp], Sequence[Seen], Sequence[Sequence[float]]], Sequence[Sequence[Solution]]]
+Replay = Callable[[Sequence[Clamp], Sequence[TracedFrame], Sequence[Sequence[float]]], Sequence[Sequence[Solution]]]
 """Called with clamps, frames and depths (clamps, frames): the wire of every frame from each clamp."""
 
 
@@ -96,39 +96,34 @@ def moved(given: Clamp, step: Array) -> Clamp:
     return replace(given, entry_mm=given.entry_mm + step[:3] @ axes, direction=direction / np.linalg.norm(direction))
 
 
-def sights(seen: Sequence[Seen]) -> list[Sight]:
+def samples_of(seen: Sequence[TracedFrame]) -> list[TraceSamples]:
     """The points of each trace that are fitted; nothing of a trace that is too short."""
-    found = []
-    for frame in seen:
-        arc = np.arange(FIRST_MM, min(REACH_MM, frame.curve.length_mm - LAST_MM) + 1e-9, EVERY_MM)
-        along = arc_length(frame.curve.points_mm)
-        sigma = np.interp(arc, along, frame.curve.sigma_mm)
-        knot = frame.curve.levels.get("knot_mm", np.nan)
-        found.append(Sight(frame.index, arc, at_arc(frame.curve.points_mm, arc), sigma, knot))
-    return found
+    stops = [min(REACH_MM, frame.curve.length_mm - LAST_MM) + 1e-9 for frame in seen]
+    arcs = [np.arange(FIRST_MM, stop, EVERY_MM) for stop in stops]
+    return [TraceSamples.of(frame.index, frame.curve, arc) for frame, arc in zip(seen, arcs, strict=True)]
 
 
-def _feet(sight: Sight, curve: Array) -> tuple[Array, Array]:
+def _feet(trace: TraceSamples, curve: Array) -> tuple[Array, Array]:
     """The nearest points of a curve to a trace's points: arc lengths (n,), not below 0, and tangents (n, 3) there."""
-    foot = sight.arc_mm
+    foot = trace.arc_mm
     for _ in range(3):
         tangent = at_arc(curve, foot + TANGENT_MM) - at_arc(curve, np.maximum(foot - TANGENT_MM, 0.0))
         tangent /= np.linalg.norm(tangent, axis=1)[:, None]
-        foot = np.maximum(foot + np.sum((sight.points_mm - at_arc(curve, foot)) * tangent, axis=1), 0.0)
+        foot = np.maximum(foot + np.sum((trace.points_mm - at_arc(curve, foot)) * tangent, axis=1), 0.0)
     return foot, tangent
 
 
-def _linear(wires: Sequence[Solution], sight: Sight, steps: Array) -> tuple[Array, Array, bool]:
+def _linear(wires: Sequence[Solution], trace: TraceSamples, steps: Array) -> tuple[Array, Array, bool]:
     """Residuals (n, 3) of a trace across the wire, their derivatives (n, 3, 6), and whether the frame can be used.
 
     wires : from the clamp itself, from the clamp moved by each of the first five ``steps`` (6,), and pushed deeper by
     the last of them.
     """
-    n = len(sight.points_mm)
+    n = len(trace.points_mm)
     if n == 0 or not all(wire.converged and len(wire.joints_mm) > 1 for wire in wires):
         return np.zeros((n, 3)), np.zeros((n, 3, len(steps))), False
     curves = [wire.joints_mm for wire in wires]
-    foot, tangent = _feet(sight, curves[0])
+    foot, tangent = _feet(trace, curves[0])
     here = at_arc(curves[0], foot)
     across = np.eye(3) - tangent[:, :, None] * tangent[:, None, :]
     change = np.stack([(at_arc(c, foot) - here) / h for c, h in zip(curves[1:], steps, strict=True)], axis=2)
@@ -136,15 +131,15 @@ def _linear(wires: Sequence[Solution], sight: Sight, steps: Array) -> tuple[Arra
     rigid = np.ones((n, len(steps)))
     rigid[:, 3:5] += foot[:, None]
     sane = bool(np.all(np.linalg.norm(jacobian, axis=1) < SNAPS * rigid))
-    return np.einsum("nij,nj->ni", across, sight.points_mm - here), jacobian, sane
+    return np.einsum("nij,nj->ni", across, trace.points_mm - here), jacobian, sane
 
 
 @dataclass(frozen=True)
 class _Fit:
     """What stays the same from step to step."""
 
-    seen: Sequence[Seen]
-    sights: Sequence[Sight]
+    seen: Sequence[TracedFrame]
+    traces: Sequence[TraceSamples]
     given: Clamp
     sigmas: Array
     replay: Replay
@@ -159,8 +154,8 @@ class _Fit:
         depths = [[max(depth_from(c, f.curve) + d, 0.1) for f, d in zip(self.seen, m, strict=True)] for c, m in pairs]
         wires = self.replay(clamps, self.seen, depths)
         residual, jacobian, good = [], [], np.zeros(len(self.seen), bool)
-        for i, sight in enumerate(self.sights):
-            left, slopes, good[i] = _linear([way[i] for way in wires], sight, steps)
+        for i, trace in enumerate(self.traces):
+            left, slopes, good[i] = _linear([way[i] for way in wires], trace, steps)
             wide = np.zeros((*left.shape, len(at)))
             wide[:, :, :5], wide[:, :, 5 + i] = slopes[:, :, :5], slopes[:, :, 5]
             residual.append(left)
@@ -175,7 +170,7 @@ class _Fit:
             use = [i for i in range(len(good)) if good[i] and i not in out]
             if not use:
                 return np.zeros(len(at)), np.diag(self.sigmas**2), out, 0
-            used = [self.sights[i] for i in use]
+            used = [self.traces[i] for i in use]
             stacked = [np.concatenate([a[i] for i in use]) for a in (residual, jacobian)]
             noise = covariance_of(used, self.voxel_mm)
             held = np.arange(len(at)) == ALONG
@@ -186,7 +181,7 @@ class _Fit:
             out.append(use[worst])
 
 
-def estimated_clamp(seen: Sequence[Seen], given: Clamp, prior: Prior, replay: Replay, voxel_mm: float) -> Clamp:
+def estimated_clamp(seen: Sequence[TracedFrame], given: Clamp, prior: Prior, replay: Replay, voxel_mm: float) -> Clamp:
     """The clamp from the traces and what the manifest says of it; the manifest's where they are too far apart.
 
     seen : frames whose traces are to be trusted, in the order of the insertion.     voxel_mm : of the scans.
@@ -198,7 +193,7 @@ def estimated_clamp(seen: Sequence[Seen], given: Clamp, prior: Prior, replay: Re
         return given
     tips = [np.nan_to_num(f.curve.tip_sigma_mm) for f in chosen]
     sigmas = np.concatenate([prior.sigmas, np.hypot(tips, TIP_VOXELS * voxel_mm)])
-    fit = _Fit(chosen, sights(chosen), given, sigmas, replay, voxel_mm)
+    fit = _Fit(chosen, samples_of(chosen), given, sigmas, replay, voxel_mm)
     at = np.zeros(len(sigmas))
     for number in range(ROUNDS):
         goal, covariance, out, used = fit.round(at)

@@ -2,12 +2,14 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag, cho_factor, cho_solve
 
-from pipeline.model import Array
+from pipeline.arrays.polyline import at_arc
+from pipeline.model import Array, Curve, arc_length
 
 CORRELATED_KNOTS = 0.43
 """Correlation length of a trace's errors along it (standard deviation of a Gaussian), in distances of the spline's
@@ -32,7 +34,7 @@ SURPRISING = 5.0
 
 
 @dataclass(frozen=True)
-class Sight:
+class TraceSamples:
     """The points of a frame's trace that are fitted.
 
     arc_mm (n,), points_mm (n, 3).     sigma_mm : (n,) across the wire, NaN where unknown.     knot_mm : distance of the
@@ -45,43 +47,50 @@ class Sight:
     sigma_mm: Array
     knot_mm: float
 
+    @classmethod
+    def of(cls, index: int, curve: Curve, arc_mm: Array) -> Self:
+        """A trace at arc lengths (n,)."""
+        sigma = np.interp(arc_mm, arc_length(curve.points_mm), curve.sigma_mm)
+        knot = curve.levels.get("knot_mm", np.nan)
+        return cls(index, arc_mm, at_arc(curve.points_mm, arc_mm), sigma, knot)
 
-def _modes(sight: Sight, voxel_mm: float) -> Array:
+
+def _modes(trace: TraceSamples, voxel_mm: float) -> Array:
     """Shapes (n, 2), mm, in which a clamped wire deviates through wrong moments and forces farther on: s^2 and s^3."""
-    s = sight.arc_mm[:, None] / MODEL_MM
+    s = trace.arc_mm[:, None] / MODEL_MM
     return np.asarray(MODEL_VOXELS * voxel_mm * np.concatenate([s**2, s**3], axis=1))
 
 
-def _sigma(sight: Sight, voxel_mm: float) -> Array:
+def _sigma(trace: TraceSamples, voxel_mm: float) -> Array:
     """Standard deviation (n,), mm, of each point across the wire, with the excess at the beginning of the trace."""
-    sigma = np.where(np.isfinite(sight.sigma_mm), sight.sigma_mm, UNKNOWN_VOXELS * voxel_mm)
-    return np.asarray(sigma * np.sqrt(1.0 + START * np.exp(-2.0 * (sight.arc_mm / _knot(sight)) ** 2)))
+    sigma = np.where(np.isfinite(trace.sigma_mm), trace.sigma_mm, UNKNOWN_VOXELS * voxel_mm)
+    return np.asarray(sigma * np.sqrt(1.0 + START * np.exp(-2.0 * (trace.arc_mm / _knot(trace)) ** 2)))
 
 
-def _knot(sight: Sight) -> float:
-    return sight.knot_mm if np.isfinite(sight.knot_mm) else KNOT_MM
+def _knot(trace: TraceSamples) -> float:
+    return trace.knot_mm if np.isfinite(trace.knot_mm) else KNOT_MM
 
 
-def _bell(a: Sight, b: Sight) -> Array:
+def _bell(a: TraceSamples, b: TraceSamples) -> Array:
     """Correlation (n, m) of errors along the traces of two frames."""
     length = CORRELATED_KNOTS * 0.5 * (_knot(a) + _knot(b))
     return np.asarray(np.exp(-0.5 * ((a.arc_mm[:, None] - b.arc_mm[None, :]) / length) ** 2))
 
 
-def covariance_of(sights: Sequence[Sight], voxel_mm: float) -> Array:
+def covariance_of(traces: Sequence[TraceSamples], voxel_mm: float) -> Array:
     """Covariance, mm^2, of one component at all points of all frames: the errors of the traces and of the model."""
-    noise = covariance_of_traces(sights, voxel_mm)
-    modes = [_modes(sight, voxel_mm) for sight in sights]
+    noise = covariance_of_traces(traces, voxel_mm)
+    modes = [_modes(trace, voxel_mm) for trace in traces]
     all_modes, own_modes = np.concatenate(modes), block_diag(*modes)
     noise += MODEL_SHARED * all_modes @ all_modes.T + (1.0 - MODEL_SHARED) * own_modes @ own_modes.T
     return np.asarray(noise)
 
 
-def covariance_of_traces(sights: Sequence[Sight], voxel_mm: float) -> Array:
+def covariance_of_traces(traces: Sequence[TraceSamples], voxel_mm: float) -> Array:
     """Covariance, mm^2, of one component at all points of all frames: the errors of the traces alone."""
-    arc = np.concatenate([sight.arc_mm for sight in sights])
-    sigma = np.concatenate([_sigma(sight, voxel_mm) for sight in sights])
-    all_bells, own_bells = np.block([[_bell(a, b) for b in sights] for a in sights]), [_bell(a, a) for a in sights]
+    arc = np.concatenate([trace.arc_mm for trace in traces])
+    sigma = np.concatenate([_sigma(trace, voxel_mm) for trace in traces])
+    all_bells, own_bells = np.block([[_bell(a, b) for b in traces] for a in traces]), [_bell(a, a) for a in traces]
     shared = np.sqrt(SHARED_FARTHER + (SHARED - SHARED_FARTHER) * np.exp(-0.5 * (arc / SHARED_MM) ** 2))
     alone = np.sqrt(1.0 - shared**2)
     bells = all_bells * np.outer(shared, shared) + block_diag(*own_bells) * np.outer(alone, alone)
@@ -115,13 +124,13 @@ def posterior(
     return mean, spread, target - slopes @ mean[free]
 
 
-def disagreeing(left: Array, sights: Sequence[Sight], voxel_mm: float) -> int | None:
-    """Position in ``sights`` of the frame with the most surprising residuals; None where chance explains them."""
+def disagreeing(left: Array, traces: Sequence[TraceSamples], voxel_mm: float) -> int | None:
+    """Position in ``traces`` of the frame with the most surprising residuals; None where chance explains them."""
     surprise, first = [], 0
-    for sight in sights:
-        n = len(sight.arc_mm)
+    for trace in traces:
+        n = len(trace.arc_mm)
         mine = left[first : first + n]
-        square = float(np.sum(mine * cho_solve(cho_factor(covariance_of([sight], voxel_mm)), mine)))
+        square = float(np.sum(mine * cho_solve(cho_factor(covariance_of([trace], voxel_mm)), mine)))
         surprise.append((square - 2 * n) / np.sqrt(4 * n))
         first += n
     worst = int(np.argmax(surprise))

@@ -12,8 +12,8 @@ import pytest
 
 from pipeline.budget import (
     SOURCES,
+    FrameSample,
     Nominal,
-    Seen,
     alone,
     coefficients,
     drawn,
@@ -30,7 +30,7 @@ from pipeline.budget.verdict import ROUND, axes_across, judged, reach_mm
 from pipeline.cli import main
 from pipeline.model import Array, Clamp, Wire
 from pipeline.simulate.config import SimulateConfig
-from pipeline.simulate.evidence import Sight
+from pipeline.simulate.evidence import TraceSamples
 from pipeline.study.manifest import ManifestError, read_manifest
 from reports import tables
 from reports.figures import figures_of
@@ -167,7 +167,7 @@ def test_two_shapes_have_their_probabilities_and_the_real_wire_has_one() -> None
     assert (found.simulated, found.real) == pytest.approx((80.5 / 101, 20.5 / 101))
     assert not found.same
     assert int(found.with_simulated.sum()) == 80
-    seen = Seen(ALONG_Z[:, 2], held, gone, ALONG_Z[:, 2], np.full(61, 1e-4))
+    seen = FrameSample(ALONG_Z[:, 2], held, gone, ALONG_Z[:, 2], np.full(61, 1e-4))
     budget = frame_budget(np.concatenate([wires, np.full((5, 61, 3), np.nan)]), seen)
     assert budget is not None
     assert budget.members == 100, "those that came to no rest do not count"
@@ -234,22 +234,24 @@ def test_a_rank_needs_members_and_traces() -> None:
     assert np.isnan(rank_of_ends(frames))
     assert np.isnan(rank_of_ends([]))
     arc = np.linspace(0.0, 30.0, 61)
-    sight = Sight(0, arc, ALONG_Z, np.full(61, 0.02), 3.0)
+    trace = TraceSamples(0, arc, ALONG_Z, np.full(61, 0.02), 3.0)
     wires = np.repeat(ALONG_Z[None], 10, axis=0)
-    assert coefficients(wires, Seen(arc, ALONG_Z), sight, 0.3, np.random.default_rng(0)) is None, "nothing traced"
+    assert coefficients(wires, FrameSample(arc, ALONG_Z), trace, 0.3, np.random.default_rng(0)) is None, (
+        "nothing traced"
+    )
 
 
 def test_a_wire_that_is_bent_otherwise_is_rare_and_one_that_is_not_is_none() -> None:
     """Members lie off by a turn about the entry; the real wire by as much, or bent the other way at its end."""
     rng = np.random.default_rng(9)
     arc, foot = np.linspace(0.0, 30.0, 61), np.linspace(0.0, 30.0, 61)
-    sight = Sight(0, arc, ALONG_Z, np.full(61, 0.02), 3.0)
+    trace = TraceSamples(0, arc, ALONG_Z, np.full(61, 0.02), 3.0)
     wires = ALONG_Z + rng.normal(size=(40, 1, 2)) @ np.eye(2, 3) * (arc / 30.0)[:, None]
     for bend, rare in ((0.0, False), (1.0, True)):
         off = 0.5 * arc / 30.0 + bend * np.clip(arc - 15.0, 0.0, None) * (arc - 25.0) / 60.0
         curve = ALONG_Z + off[:, None] * np.array([1.0, 0.0, 0.0])
-        seen = Seen(arc, ALONG_Z, curve, foot, np.full(61, 0.02**2))
-        found = coefficients(wires, seen, sight, 0.3, rng)
+        seen = FrameSample(arc, ALONG_Z, curve, foot, np.full(61, 0.02**2))
+        found = coefficients(wires, seen, trace, 0.3, rng)
         assert found is not None
         assert (rank_of_ends([found]) <= 0.05) == rare
 

@@ -15,7 +15,7 @@ from pipeline.arrays.polyline import at_arc, resample, samples, tip_tangent, to_
 from pipeline.compare import compare, compare_truth, point_to_curve, rms
 from pipeline.compare.branches import branches_of
 from pipeline.compare.config import CompareConfig
-from pipeline.compare.metrics import Way, scored
+from pipeline.compare.metrics import VesselAxis, scored
 from pipeline.model import Curve, Lumen, arc_length
 from pipeline.run.stages.compare import _too_near, _truth_elsewhere
 from pipeline.run.stages.known import Frame
@@ -197,7 +197,7 @@ def test_a_sac_on_the_wall_makes_no_two_vessels_of_one() -> None:
 
 def test_the_tip_along_and_across_the_vessel_and_the_depth_that_is_off() -> None:
     axis = line(30.0)
-    way = Way(axis, branches_of(tubes(axis).distance, axis[0]))
+    way = VesselAxis(axis, branches_of(tubes(axis).distance, axis[0]))
     deeper = line(21.0, 0.4)
     result = compare(simulated(deeper), traced(line(20.0, 0.0)), open_space(), way=way)
     assert (result["tip_along_mm"], result["tip_across_mm"]) == pytest.approx((1.0, 0.4))
@@ -219,7 +219,7 @@ def test_arc_lengths_are_counted_from_the_plane_that_the_wire_is_held_in(ahead: 
 
 def test_the_side_of_the_vessel_counts_where_it_is_known() -> None:
     axis = line(30.0)
-    way = Way(axis, branches_of(tubes(axis).distance, axis[0]))
+    way = VesselAxis(axis, branches_of(tubes(axis).distance, axis[0]))
 
     def agrees(first: float, second: float) -> float:
         return compare(simulated(line(20.0, first)), traced(line(20.0, second)), open_space(), way=way)["side_ok"]

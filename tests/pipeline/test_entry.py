@@ -15,7 +15,7 @@ from pipeline.model import Array, Clamp, Curve
 from pipeline.run.stages.clamp import clamp_of
 from pipeline.run.stages.given import manifest_clamp
 from pipeline.simulate import together
-from pipeline.simulate.clamp import Prior, Seen, _left_out, depth_from, estimated_clamp, moved
+from pipeline.simulate.clamp import Prior, TracedFrame, _left_out, depth_from, estimated_clamp, moved
 from pipeline.simulate.evidence import posterior
 from solver import GuideWire, Insertion, Solution
 from solver.relax import base_frame
@@ -48,14 +48,16 @@ def trace(depth_mm: float, noise_mm: float, rng: np.random.Generator) -> Curve:
     return Curve(points + errors, np.full(len(s), max(noise_mm, 1e-3)), 0.01, levels={"knot_mm": 3.0})
 
 
-def replay(clamps: Sequence[Clamp], seen: Sequence[Seen], depths: Sequence[Sequence[float]]) -> list[list[Solution]]:
+def replay(
+    clamps: Sequence[Clamp], seen: Sequence[TracedFrame], depths: Sequence[Sequence[float]]
+) -> list[list[Solution]]:
     """The solver's free wire from each clamp."""
     wires = [Insertion(WIRE, None, c.entry_mm, c.direction, material_axis=c.material_axis) for c in clamps]
     return together(wires, depths, [frame.roll_deg for frame in seen])
 
 
 def estimate(curves: Sequence[Curve], given: Clamp, prior: Prior = PRIOR) -> Clamp:
-    return estimated_clamp([Seen(i, curve) for i, curve in enumerate(curves)], given, prior, replay, VOXEL_MM)
+    return estimated_clamp([TracedFrame(i, curve) for i, curve in enumerate(curves)], given, prior, replay, VOXEL_MM)
 
 
 def off(tilt_deg: float, at_mm: Sequence[float] = (0.1, 0.1, 0.0)) -> Clamp:

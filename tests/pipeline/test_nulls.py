@@ -86,17 +86,17 @@ def test_two_vessels_that_do_not_meet_have_no_path() -> None:
     ends = np.array([[-3.0, 0.0, -5.0], [3.0, 0.0, 5.0]])
     found = clues_of(lumen, ends)
     assert found.centreline is None
-    assert nulls.NULLS["centreline"](found, 5.0, nulls.Seen()) is None
+    assert nulls.NULLS["centreline"](found, 5.0, nulls.PredictorInputs()) is None
     assert nulls.min_bending(found, 5.0) is None
 
 
 def test_the_previous_wire_is_pushed_on(quarter_torus: tuple[Lumen, np.ndarray]) -> None:
     lumen, axis = quarter_torus
     before = np.array([[0.0, 0, 0], [0.0, 0, 10.0]])
-    guess = nulls.NULLS["previous"](clues_of(lumen, axis), 12.0, nulls.Seen(before))
+    guess = nulls.NULLS["previous"](clues_of(lumen, axis), 12.0, nulls.PredictorInputs(before))
     assert guess is not None
     np.testing.assert_allclose(guess[-1], [0, 0, 12.0])
-    assert nulls.NULLS["previous"](clues_of(lumen, axis), 12.0, nulls.Seen()) is None
+    assert nulls.NULLS["previous"](clues_of(lumen, axis), 12.0, nulls.PredictorInputs()) is None
 
 
 def test_the_least_bent_curve_is_led_to_the_tip_that_it_is_told(quarter_torus: tuple[Lumen, np.ndarray]) -> None:
@@ -107,29 +107,29 @@ def test_the_least_bent_curve_is_led_to_the_tip_that_it_is_told(quarter_torus: t
     pull = {"entry_mm": free[0], "entry_direction": clues.clamp.direction, "start_mm": free, "load_N": [0.0, 0.03, 0.0]}
     aside = relax(clues.straight_wire, clues.hard_wall, depth_mm=depth, **pull).joints_mm[-1]
     assert np.linalg.norm(aside - free[-1]) > 0.5
-    guess = nulls.NULLS["pinned"](clues, depth, nulls.Seen(tip_mm=aside))
+    guess = nulls.NULLS["pinned"](clues, depth, nulls.PredictorInputs(tip_mm=aside))
     assert guess is not None
     assert np.linalg.norm(guess[-1] - aside) <= 0.1
     assert arc_length(guess)[-1] == pytest.approx(depth, abs=0.5)
     # a real wire takes a longer way: its tip lies before that of the least bent one of its length
     before = free[-1] - 1.5 * (free[-1] - free[-2]) / np.linalg.norm(free[-1] - free[-2])
-    shorter = nulls.NULLS["pinned"](clues, depth, nulls.Seen(tip_mm=before))
+    shorter = nulls.NULLS["pinned"](clues, depth, nulls.PredictorInputs(tip_mm=before))
     assert shorter is not None
     assert np.linalg.norm(shorter[-1] - before) <= 0.1
     assert bending(guess) > bending(free)
-    assert nulls.NULLS["pinned"](clues, depth, nulls.Seen()) is None
-    assert nulls.NULLS["pinned"](clues, depth, nulls.Seen(tip_mm=free[-1] + 30.0)) is None, "out of reach"
+    assert nulls.NULLS["pinned"](clues, depth, nulls.PredictorInputs()) is None
+    assert nulls.NULLS["pinned"](clues, depth, nulls.PredictorInputs(tip_mm=free[-1] + 30.0)) is None, "out of reach"
 
 
 def test_the_ceiling_lies_between_the_frames_around(quarter_torus: tuple[Lumen, np.ndarray]) -> None:
     lumen, axis = quarter_torus
     line = np.array([[0.0, 0, 0], [0.0, 0, 10.0]])
     aside = np.array([1.0, 0.0, 0.0])
-    around = nulls.Seen(previous_mm=line - aside, following_mm=line + aside)
+    around = nulls.PredictorInputs(previous_mm=line - aside, following_mm=line + aside)
     guess = nulls.NULLS["neighbours"](clues_of(lumen, axis), 10.0, around)
     assert guess is not None
     np.testing.assert_allclose(guess[:, 0], 0.0)
-    assert nulls.NULLS["neighbours"](clues_of(lumen, axis), 10.0, nulls.Seen(previous_mm=line)) is None
+    assert nulls.NULLS["neighbours"](clues_of(lumen, axis), 10.0, nulls.PredictorInputs(previous_mm=line)) is None
 
 
 def test_what_is_told_of_the_frame_is_no_rival() -> None:

@@ -15,7 +15,7 @@ from pipeline.arrays.polyline import to_length
 from pipeline.cli import main
 from pipeline.compare import metrics, nulls
 from pipeline.compare.metrics import Pair
-from pipeline.compare.nulls import Clues, Seen
+from pipeline.compare.nulls import Clues, PredictorInputs
 from pipeline.model import Array
 from pipeline.run.case import Job
 from pipeline.study.manifest import read_manifest
@@ -97,7 +97,7 @@ def as_before() -> Iterator[None]:
         registry.update(entries)
 
 
-def straight_on(clues: Clues, depth_mm: float, _seen: Seen) -> Array:
+def straight_on(clues: Clues, depth_mm: float, _seen: PredictorInputs) -> Array:
     """A wire that ignores the vessel."""
     return to_length(np.array([clues.clamp.entry_mm, clues.clamp.entry_mm + clues.clamp.direction]), depth_mm)
 

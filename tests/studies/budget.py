@@ -171,7 +171,7 @@ def record(run: Context, known: Known, members: int) -> list[dict[str, Any]]:
         budget = frame_budget(wires, seen)
         if budget is None or budget.ratio is None or budget.u_mm is None:
             continue
-        ends = coefficients(wires, seen, work.sight(frame, seen), VOXEL_MM, rng)
+        ends = coefficients(wires, seen, work.trace(frame, seen), VOXEL_MM, rng)
         assert ends is not None
         shapes = budget.shapes
         p = None if shapes is None else [shapes.simulated, shapes.real, shapes.same]

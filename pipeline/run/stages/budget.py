@@ -10,9 +10,9 @@ from pipeline.arrays.polyline import at_arc, samples
 from pipeline.budget import (
     SOURCES,
     Budget,
+    FrameSample,
     Nominal,
     Scene,
-    Seen,
     Sigmas,
     alone,
     coefficients,
@@ -31,7 +31,7 @@ from pipeline.model import Array, arc_length
 from pipeline.run.stages.known import Context, Frame, Known
 from pipeline.simulate import altered
 from pipeline.simulate.clamp import ahead_of
-from pipeline.simulate.evidence import UNKNOWN_VOXELS, Sight
+from pipeline.simulate.evidence import UNKNOWN_VOXELS, TraceSamples
 from pipeline.simulate.resolution import lengths_mm
 
 AT_REST, RARE = 0.9, 0.05
@@ -128,16 +128,16 @@ class Work:
         tips = [np.nan_to_num(f.curve.tip_sigma_mm) for f in self.frames if f.curve is not None]
         return np.hypot(tips, TIP_VOXELS * self.voxel)
 
-    def _seen(self, frame: Frame) -> Seen:
+    def _seen(self, frame: Frame) -> FrameSample:
         """A frame's wires at the points at which it was compared."""
         settings, errors = self.run.config.compare, frame.comparison
         assert frame.simulated is not None
         if errors is None or frame.curve is None:
             arc = scored(samples(frame.depth_mm, settings.sample_mm), settings.skip_mm)
-            return Seen(arc, at_arc(frame.simulated.joints_mm, arc))
+            return FrameSample(arc, at_arc(frame.simulated.joints_mm, arc))
         own = self.trace_mm(frame) ** 2 + self._segments_mm(frame) ** 2
         ahead = ahead_of(self.nominal.clamp, frame.curve)
-        return Seen(errors.arc_mm, errors.sample_mm, frame.curve.points_mm, errors.foot_arc_mm, own, ahead)
+        return FrameSample(errors.arc_mm, errors.sample_mm, frame.curve.points_mm, errors.foot_arc_mm, own, ahead)
 
     def trace_mm(self, frame: Frame) -> Array:
         """Standard deviation (n,) of the trace along each axis across it, where a frame was compared."""
@@ -166,13 +166,13 @@ class Work:
         rng = np.random.default_rng(self.run.config.budget.seed)
         each = zip(self.frames, self.seen, ensemble, budgets, strict=True)
         calm = [(frame, seen, wires) for frame, seen, wires, b in each if b is not None and b.shapes is None]
-        ends = [coefficients(wires, seen, self.sight(frame, seen), self.voxel, rng) for frame, seen, wires in calm]
+        ends = [coefficients(wires, seen, self.trace(frame, seen), self.voxel, rng) for frame, seen, wires in calm]
         return rank_of_ends([one for one in ends if one is not None])
 
-    def sight(self, frame: Frame, seen: Seen) -> Sight:
+    def trace(self, frame: Frame, seen: FrameSample) -> TraceSamples:
         """The trace's uncertainty at the points at which a frame was compared."""
         knot = np.nan if frame.curve is None else frame.curve.levels.get("knot_mm", np.nan)
-        return Sight(frame.index, seen.arc_mm, seen.nominal_mm, self.trace_mm(frame), knot)
+        return TraceSamples(frame.index, seen.arc_mm, seen.nominal_mm, self.trace_mm(frame), knot)
 
     def ensemble(self, sigmas: Sigmas, count: int) -> list[Array]:
         """The wires (members, n, 3) of each frame."""

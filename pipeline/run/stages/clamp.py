@@ -13,7 +13,7 @@ from pipeline.run.stages.roll import with_fitted_roll
 from pipeline.run.stages.segment import segment_vessel
 from pipeline.run.stages.trace import trace_frames
 from pipeline.simulate import altered, insertion_of, together
-from pipeline.simulate.clamp import Seen, estimated_clamp
+from pipeline.simulate.clamp import TracedFrame, estimated_clamp
 from pipeline.simulate.departures import beside
 from pipeline.simulate.resolution import lengths_mm
 from pipeline.study.manifest import Case
@@ -55,7 +55,7 @@ def _of_another(run: Context, other: Case, given: Clamp, own: Sequence[Frame]) -
 
 
 def _replayed(
-    run: Context, known: Known, clamps: Sequence[Clamp], seen: Sequence[Seen], depths: Sequence[Sequence[float]]
+    run: Context, known: Known, clamps: Sequence[Clamp], seen: Sequence[TracedFrame], depths: Sequence[Sequence[float]]
 ) -> list[list[Solution]]:
     """The wire of every frame from several clamps, with the longest segments."""
     case, config, lumen = run.case, run.config, known.lumen

@@ -8,7 +8,7 @@ import numpy as np
 
 from pipeline.compare import compare, compare_truth
 from pipeline.compare.metrics import rms
-from pipeline.compare.nulls import Clues, Seen, score
+from pipeline.compare.nulls import Clues, PredictorInputs, score
 from pipeline.model import Array, Curve
 from pipeline.run.log import Log
 from pipeline.run.stages.beside import MOST_NAMED
@@ -89,7 +89,7 @@ def _all_compared(
         part, frame = run.part(), known.frames[number]
         with part.log.timed("compare", frame.index):
             tip = frame.curve.points_mm[-1] if frame.curve is not None and frame.traced else None
-            seen = Seen(before[number], after[number], tip, simulated.get(frame.index, {}))
+            seen = PredictorInputs(before[number], after[number], tip, simulated.get(frame.index, {}))
             done = _compared(part, known, frame, clues, seen)
             if frame.truth_mm is not None:
                 truth = compare_truth(frame.truth_mm, frame.curve, frame.simulated, run.config.compare)
@@ -184,7 +184,7 @@ def _trusted_before(frames: tuple[Frame, ...]) -> Iterator[Array | None]:
         last = frame.trusted_curve or last
 
 
-def _compared(run: Context, known: Known, frame: Frame, clues: Clues | None, seen: Seen) -> Frame:
+def _compared(run: Context, known: Known, frame: Frame, clues: Clues | None, seen: PredictorInputs) -> Frame:
     if frame.ok and not run.case.compared:
         only = FrameStatus.SIMULATED
         return replace(frame, status=only.identifier, sentence=only.value)

@@ -13,7 +13,7 @@ from pipeline.compare.config import CompareConfig
 from pipeline.compare.metrics import point_to_curve, scored
 from pipeline.model import Array
 from pipeline.run.stages.known import Context, Frame, Known
-from pipeline.run.stages.rivals import BENT, CATHETER, ROLL, TIP_CURVE, Way, Wires, simulated_frames
+from pipeline.run.stages.rivals import BENT, CATHETER, ROLL, TIP_CURVE, SimulatedVariant, Wires, simulated_frames
 from pipeline.simulate.departures import turned
 
 FAR_NEARER = 0.7
@@ -34,7 +34,9 @@ def from_traces(known: Known, wires: Wires, config: CompareConfig) -> list[Squar
     return [_squares(frame, wire, config) for frame, wire in zip(simulated_frames(known), wires, strict=True)]
 
 
-def contradicted(run: Context, known: Known, ways: Sequence[Way], otherwise: Sequence[Sequence[Squares]]) -> list[str]:
+def contradicted(
+    run: Context, known: Known, ways: Sequence[SimulatedVariant], otherwise: Sequence[Sequence[Squares]]
+) -> list[str]:
     """A warning where one of ``ways`` lies far nearer than the wire as stated, in the case or in a frame of it.
 
     Of several ways, the nearest. otherwise : of each of ``ways``, its wires ``from_traces``.
@@ -82,8 +84,8 @@ def _squares(frame: Frame, wire: Array | None, config: CompareConfig) -> Squares
 
 
 def _nearest(
-    ways: Sequence[Way], stated: Sequence[Squares], otherwise: Sequence[Sequence[Squares]], share: float
-) -> tuple[float, float, Way] | None:
+    ways: Sequence[SimulatedVariant], stated: Sequence[Squares], otherwise: Sequence[Sequence[Squares]], share: float
+) -> tuple[float, float, SimulatedVariant] | None:
     """The way whose rms distance is least, with it and the stated one's over the same frames; None above a share.
 
     otherwise : of each way, as ``stated`` by frame.
@@ -98,7 +100,7 @@ def _nearest(
     return min(nearer, key=lambda one: one[0]) if nearer else None
 
 
-def _said(where: str, other_mm: float, stated_mm: float, way: Way) -> str:
+def _said(where: str, other_mm: float, stated_mm: float, way: SimulatedVariant) -> str:
     """The warning, with what to look at."""
     how, do = {
         BENT: (

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.compare.metrics import DISTAL_MM, Pair, Way, distal, pair_of, rms
+from pipeline.compare.metrics import DISTAL_MM, Pair, VesselAxis, distal, pair_of, rms
 from pipeline.model import Clamp
 from pipeline.run.stages.given import manifest_clamp
 from pipeline.run.stages.known import Context, Frame, Known
@@ -51,7 +51,7 @@ def replayed_entries(run: Context, known: Known) -> list[list[Solution]]:
 
 
 def four_entries(
-    run: Context, known: Known, wires: Sequence[Sequence[Solution]], way: Way
+    run: Context, known: Known, wires: Sequence[Sequence[Solution]], way: VesselAxis
 ) -> tuple[dict[str, Any], ...]:
     """Rows of entries.csv, over the frames that are ok and come to rest in all four; none where there are not four.
 
@@ -68,7 +68,7 @@ def _depth(frame: Frame, clamp: Clamp, depth: str) -> float:
     return depth_from(clamp, frame.curve) if depth == "traced" else frame.expected_mm
 
 
-def _pair(run: Context, known: Known, frame: Frame, wire: Solution, way: Way) -> Pair:
+def _pair(run: Context, known: Known, frame: Frame, wire: Solution, way: VesselAxis) -> Pair:
     assert frame.curve is not None
     assert known.lumen is not None
     return pair_of(wire, frame.curve, known.lumen, run.config.compare, way)

@@ -7,7 +7,7 @@ import numpy as np
 from pipeline.calibrate.trials import Trial
 from pipeline.model import Clamp, Curve
 from pipeline.run.stages.known import Context, Frame, Known
-from pipeline.simulate.clamp import Prior, Seen
+from pipeline.simulate.clamp import Prior, TracedFrame
 from pipeline.status import FrameStatus
 from solver import VesselWall
 
@@ -15,10 +15,10 @@ ENTRY_SIGMA_VOXELS = 0.5
 """Standard deviation, voxels, of an entry point picked in a scan, where the manifest states none."""
 
 
-def seen_in(frames: Sequence[Frame]) -> list[Seen]:
+def seen_in(frames: Sequence[Frame]) -> list[TracedFrame]:
     """The frames whose traces can be trusted near the entry."""
     return [
-        Seen(frame.index, curve, frame.roll_deg, frame.catheter_mm)
+        TracedFrame(frame.index, curve, frame.roll_deg, frame.catheter_mm)
         for frame in frames
         if (curve := frame.trusted_curve or _faint(frame)) is not None
     ]

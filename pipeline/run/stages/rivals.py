@@ -28,7 +28,7 @@ def simulated_frames(known: Known) -> list[Frame]:
     return [f for f in known.frames if f.simulated is not None and len(f.simulated.joints_mm) > 1]
 
 
-class Way(NamedTuple):
+class SimulatedVariant(NamedTuple):
     """What a wire is simulated with that is not as stated.
 
     turn_deg : by which every roll is turned.  bent : times the stated curve of the tip.
@@ -50,7 +50,7 @@ TIMES = 0.5, 2.0, 5.0
 """The curve of the tip, over the stated one, that may speak against it."""
 
 
-def rival_ways(run: Context, known: Known) -> list[Way]:
+def rival_ways(run: Context, known: Known) -> list[SimulatedVariant]:
     """How the rivals are simulated: with a straight tip, ROLLS turned ones, bent TIMES as much, without a catheter.
 
     Empty where they are switched off or nothing was simulated. A wire that is straight at rest has no curve to leave
@@ -60,15 +60,19 @@ def rival_ways(run: Context, known: Known) -> list[Way]:
         return []
     plain, ways = run.config.simulate, []
     if run.case.wire.curved:
-        ways = [Way(TIP_CURVE, replace(plain, rest_curvature_scale=0.0))]
-        ways += [Way(ROLL, plain, 360.0 * i / ROLLS) for i in range(ROLLS)]
+        ways = [SimulatedVariant(TIP_CURVE, replace(plain, rest_curvature_scale=0.0))]
+        ways += [SimulatedVariant(ROLL, plain, 360.0 * i / ROLLS) for i in range(ROLLS)]
         stated = plain.rest_curvature_scale
-        ways += [Way(BENT, replace(plain, rest_curvature_scale=times * stated), bent=times) for times in TIMES]
-    return ways + [Way(CATHETER, plain)] * any(frame.catheter_mm > 0.0 for frame in simulated_frames(known))
+        ways += [
+            SimulatedVariant(BENT, replace(plain, rest_curvature_scale=times * stated), bent=times) for times in TIMES
+        ]
+    return ways + [SimulatedVariant(CATHETER, plain)] * any(
+        frame.catheter_mm > 0.0 for frame in simulated_frames(known)
+    )
 
 
 def simulated_rivals(
-    run: Context, known: Known, ways: Sequence[Way], wires: Sequence[Wires]
+    run: Context, known: Known, ways: Sequence[SimulatedVariant], wires: Sequence[Wires]
 ) -> dict[int, dict[str, Array]]:
     """By frame and by name, the wires (n, 3) of the predictors; a frame that was not simulated has none.
 
@@ -86,7 +90,7 @@ def simulated_rivals(
     return found
 
 
-def rival_wires(run: Context, known: Known, way: Way) -> Wires:
+def rival_wires(run: Context, known: Known, way: SimulatedVariant) -> Wires:
     """The wires under one of ``rival_ways``; none where the solver has no such wire, as of five times a sharp bend."""
     case, lumen, clamp, frames = run.case, known.lumen, known.clamp, simulated_frames(known)
     assert lumen is not None

@@ -9,7 +9,7 @@ from pipeline.arrays.grids import corners_mm
 from pipeline.arrays.polyline import at_arc
 from pipeline.compare import Comparison
 from pipeline.compare.config import CompareConfig
-from pipeline.compare.nulls import NULLS, TOLD, Clues, Seen
+from pipeline.compare.nulls import NULLS, TOLD, Clues, PredictorInputs
 from pipeline.compare.views import Screen, counted, nulls_in, pair_in, screen_of, values_in
 from pipeline.load.views import View
 from pipeline.model import Array
@@ -25,7 +25,7 @@ def compare_in_views(run: Context, known: Known) -> tuple[Frame, ...]:
     ways = [] if clues is None else rival_ways(run, known)
     wires = run.share("compare", lambda i, _: rival_wires(run, known, ways[i]), len(ways))
     simulated = simulated_rivals(run, known, ways, wires)
-    seen = [Seen(simulated=simulated.get(frame.index, {})) for frame in known.frames]
+    seen = [PredictorInputs(simulated=simulated.get(frame.index, {})) for frame in known.frames]
     frames = [_compared(frame, clues, told, config) for frame, told in zip(known.frames, seen, strict=True)]
     limited = "" if clues is None else _limited(frames, clues, config)
     views = [frame.view for frame in frames if frame.view is not None]
@@ -53,7 +53,7 @@ def _clues(run: Context, known: Known) -> Clues | None:
     return Clues(known.lumen, known.clamp, run.case.wire.radius_mm, towards)
 
 
-def _compared(frame: Frame, clues: Clues | None, seen: Seen, config: CompareConfig) -> Frame:
+def _compared(frame: Frame, clues: Clues | None, seen: PredictorInputs, config: CompareConfig) -> Frame:
     view = frame.view
     if view is None or clues is None or frame.simulated is None or len(frame.simulated.joints_mm) < 2:
         return frame
@@ -92,7 +92,7 @@ def _limited(frames: Sequence[Frame], clues: Clues, config: CompareConfig) -> st
 
 def _radii(frame: Frame, clues: Clues, config: CompareConfig) -> Array:
     """The lumen's radius along the part of its middle that was scored."""
-    path = NULLS["centreline"](clues, frame.depth_mm, Seen())
+    path = NULLS["centreline"](clues, frame.depth_mm, PredictorInputs())
     assert path is not None
     assert frame.view is not None
     part = at_arc(path, counted(path, frame.view.fitted, config))

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from pipeline.arrays.lattice import entry_point, grown, kernel, nodes_near, unravelled
 
-Three = tuple[float, float, float]
 BLOCKS = 14
 """Control points that one voxel may see: 5 for one strand, 10 for two in contact, with room for a third."""
 TINTS = 8
