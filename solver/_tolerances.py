@@ -49,8 +49,11 @@ SOFTER = 0.04
 gain: the softest mode of k joints is k⁴ times softer than a joint, 4e-11 of it in 400 mm of wire in a sheath."""
 WORST_DAMPING = 1e9
 """Levenberg term, relative to the joints' stiffness, at which no useful step is left."""
-SEARCHES = 6
-"""Step lengths tried (each 0.4 of the one before) before the Levenberg term is raised instead."""
+LESS_DAMPING, AGAIN_DAMPED, MORE_DAMPING = 0.2, 0.5, 6.0
+"""Factors on a Levenberg term: after steps that went well; on the last one, where it is needed again after none; and
+after a step that was not worth taking."""
+SEARCHES, SHORTER = 6, 0.4
+"""Step lengths tried before the Levenberg term is raised instead; each over the one before."""
 FINE = 1e-5
 """Predicted fall, over the energy, below which whole steps may lead uphill for a while: the shape hardly changes."""
 WATCHDOG_STEPS = 8

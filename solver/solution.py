@@ -4,12 +4,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
 from functools import cached_property
+from operator import itemgetter
 from typing import Any, NamedTuple, Self
 
 import numpy as np
 
 from solver import _tolerances as tol
-from solver._kernels.records import WORK
+from solver._kernels.records import PLACE, WORK
 from solver.grid import Array
 from solver.self_contact import self_overlap_mm
 
@@ -55,6 +56,10 @@ class Snap(NamedTuple):
     released_N_mm: float
     moved_mm: float
     other_mm: float = 0.0
+
+
+_NAMES = PLACE.names or ()
+_OF_PLACE = itemgetter(*map(_NAMES.index, ("energy", "dissipated", "calm", "rubbed", "stored", "snaps")))
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +123,7 @@ class Solution:
         first ``PLACE.snaps`` are valid.     ended : status, iterations, depth, mm, roll, degrees, wire's radius, mm.
         """
         place, (start, penetration, push, force, torque, *_, pivot), (bending, wall, *_), counts = notes
-        _, _, energy, *_, dissipated, calm, rubbed, _, _, _, _, stored, snapped = place
+        energy, dissipated, calm, rubbed, stored, snapped = _OF_PLACE(place)
         reaction = np.array(force)
         for array in (*arrays, reaction):
             array.setflags(write=False)

@@ -36,7 +36,7 @@ def search(problem: Problem, k: int, now: Any, fraction: float, noise: float, re
         enough = trial <= now.energy - tol.SUFFICIENT * fraction * decrement
         if (enough or (decrement <= noise and trial <= now.energy)) and admissible(problem, now.slot, k):
             return trial
-        fraction *= 0.4
+        fraction *= tol.SHORTER
     return math.inf
 
 
@@ -195,7 +195,7 @@ def iterate(problem: Problem, k: int, now: Any, tolerance: float, report: Any) -
         if trial == math.inf and fine and watchdog(problem, k, now, tol.RISE * scale, report):
             return UNFINISHED
         if trial == math.inf:
-            trial = search(problem, k, now, 0.4, noise, report)
+            trial = search(problem, k, now, tol.SHORTER, noise, report)
     elif now.damping == 0.0:
         now.forked = 1
         costate(problem, now.slot, k, report)
@@ -262,7 +262,7 @@ def take(problem: Problem, k: int, now: Any, trial: float, free: bool, tolerance
     now.last_damping = now.damping if now.damping > 0.0 else tol.LEAST_DAMPING
     now.patience -= 1
     if now.patience <= 0:
-        now.damping = 0.2 * now.damping if now.damping > tol.LEAST_DAMPING else 0.0
+        now.damping = tol.LESS_DAMPING * now.damping if now.damping > tol.LEAST_DAMPING else 0.0
     return UNFINISHED
 
 
@@ -274,7 +274,7 @@ def hold_back(problem: Problem, k: int, now: Any, report: Any) -> int:
         return UNFINISHED
     problem.scratch.counters[0].levenberg += 1
     now.patience = 2
-    now.damping = 0.5 * now.last_damping if now.damping == 0.0 else 6 * now.damping
+    now.damping = tol.AGAIN_DAMPED * now.last_damping if now.damping == 0.0 else tol.MORE_DAMPING * now.damping
     if now.damping <= tol.WORST_DAMPING:
         return UNFINISHED
     costate(problem, now.slot, k, report)

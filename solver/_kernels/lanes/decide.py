@@ -101,7 +101,7 @@ def take(me: Any, now: Any, number: Any, lane: int) -> None:
 def shorten(me: Any, now: Any, counters: Any) -> None:
     """Try a shorter step in the next round, or another way, as ``newton_method.iterate`` does."""
     me.tries += 1
-    me.fraction *= 0.4
+    me.fraction *= tol.SHORTER
     if me.tries == 1 and now.damping == 0.0 and now.first_free == 0 and me.decrement <= tol.FINE * me.scale:
         me.phase = ALONE
     elif me.tries == tol.SEARCHES:
@@ -116,14 +116,14 @@ def finish_taking(me: Any, now: Any, number: Any, lane: int) -> None:
     now.last_damping = now.damping if now.damping > 0.0 else tol.LEAST_DAMPING
     now.patience -= 1
     if now.patience <= 0:
-        now.damping = 0.2 * now.damping if now.damping > tol.LEAST_DAMPING else 0.0
+        now.damping = tol.LESS_DAMPING * now.damping if now.damping > tol.LEAST_DAMPING else 0.0
     next_iteration(me, now)
 
 
 @kernel
 def hold_back(me: Any, now: Any, counters: Any) -> None:
     """``newton_method.hold_back``; where no useful step is left the wire goes on alone."""
-    damping = 0.5 * now.last_damping if now.damping == 0.0 else 6 * now.damping
+    damping = tol.AGAIN_DAMPED * now.last_damping if now.damping == 0.0 else tol.MORE_DAMPING * now.damping
     if now.first_free > 0:
         now.first_free = 0
     elif damping <= tol.WORST_DAMPING:
