@@ -109,6 +109,5 @@ def connect_relative(
         return order, read + more
     rank = np.argsort(others)
     at = np.minimum(np.searchsorted(others, order, sorter=rank), len(others) - 1)
-    shared = others[rank[at]] == order
-    kept = own > np.where(shared, other[rank[at]], 0)
-    return order[kept], read + more
+    rivalled = others[rank[at]] == order
+    return order[~rivalled | (own > other[rank[at]])], read + more

@@ -10,6 +10,7 @@ from typing import Any
 
 from pipeline.calibrate.unknowns import unknowns
 from pipeline.cli import main
+from tests.numbers.drawn import printed
 from tests.numbers.kept import Numbers, Scene, digest
 from tests.numbers.runs import values_of
 
@@ -37,9 +38,10 @@ def _found(record: str, kept: tuple[str, ...], *words: str) -> Numbers:
         assert main(made) == 0
         text = manifest.read_text(encoding="utf-8")
         manifest.write_text(text.replace('role = "validation"', 'role = "calibration"'), encoding="utf-8")
-        assert main(["calibrate", str(manifest), "-o", str(out), "--no-cache", *words]) == 0
+        with printed() as shown:
+            assert main(["calibrate", str(manifest), "-o", str(out), "--no-cache", *words]) == 0
         found: dict[str, Any] = json.loads((out / record).read_text(encoding="utf-8"))
-    return {name: digest(list(values_of(found[name]))) for name in kept}
+    return {name: digest(list(values_of(found[name]))) for name in kept} | shown
 
 
 SCENES: dict[str, Scene] = {"parameters": parameters, "calibrated": calibrated, "designed": designed}

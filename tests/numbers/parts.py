@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from tests.numbers import benchmark, fits, imaging, pages, runs, solver, synthetic, traces
+from tests.numbers import benchmark, fits, imaging, pages, runs, sentences, solver, synthetic, traces
 from tests.numbers.kept import Scene
 
 
@@ -26,6 +26,8 @@ PARTS = {
     # with eight members a budget's scores move by 2e-4 from one processor to another
     "runs": Part(runs.SCENES, 1e-3),
     "traces": Part(traces.SCENES, 1e-4),
+    # the numbers of a sentence have two or three digits
+    "sentences": Part(sentences.SCENES, 1e-4),
     # what hardly shows in the traces hangs on their last digits
     "fits": Part(fits.SCENES, 1e-3),
     # sizes and places are what they are set to, but for points of a convergence study that are rounding alone

@@ -10,15 +10,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from pipeline.cli import main
-from tests.numbers.drawn import drawn
+from tests.numbers.drawn import TIMED, drawn, printed, said
 from tests.numbers.imaging import TIMES, arrays, columns
 from tests.numbers.kept import Numbers, Scene, digest
 
 NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
 HEADS = {".nrrd": re.compile(rb"\A.*?\n\n", re.DOTALL), ".vtp": re.compile(rb"<[^>]*>")}
 """What of these files is no data, but says what the data are."""
+HASH = re.compile(r"[0-9a-f]{16,}")
 OTHERWISE = re.compile(r"provenance|sha256|bytes|MiB|key|version|argv|host|path|time|seconds|_s$|_ms$|config|inputs")
 """What another machine or another day has otherwise."""
 
@@ -37,18 +39,37 @@ def values_of(record: Any, name: str = "") -> Iterator[float]:
         yield float(record)
 
 
+def texts_of(record: Any, name: str = "") -> Iterator[str]:
+    """The texts of a record, in order."""
+    if OTHERWISE.search(name):
+        return
+    if isinstance(record, dict):
+        for key in sorted(record):
+            yield from texts_of(record[key], key)
+    elif isinstance(record, list):
+        for item in record:
+            yield from texts_of(item, name)
+    elif isinstance(record, str) and not HASH.fullmatch(record):
+        yield record
+
+
 def of_file(path: Path) -> Iterator[tuple[str, list[float]]]:
     """The numbers of one file, by quantity; none of a kind that has no numbers of its own."""
     name = path.name.partition(".")[0]
     if path.suffix == ".csv" and not TIMES.search(name):
         yield from columns(path)
+        table = pd.read_csv(path, dtype=str, keep_default_na=False)
+        texts = [v for name in table if not OTHERWISE.search(str(name)) for v in table[name] if not NUMBER.fullmatch(v)]
+        yield from said(name, "  ".join(texts)).items()
     elif path.suffix == ".h5":
         kinds: dict[str, list[float]] = {}
         for key, values in arrays(path):
             kinds.setdefault(key.partition("_")[2], []).extend(values)
         yield from ((f"{name}.{kind}", values) for kind, values in kinds.items())
     elif path.suffix == ".json" and not OTHERWISE.search(name):
-        yield f"{name}.record", digest(list(values_of(json.loads(path.read_text(encoding="utf-8")))))
+        record = json.loads(path.read_text(encoding="utf-8"))
+        yield f"{name}.record", digest(list(values_of(record)))
+        yield from said(name, "  ".join(texts_of(record))).items()
     elif path.suffix in HEADS:
         head = b" ".join(HEADS[path.suffix].findall(path.read_bytes())).decode("latin-1")
         yield f"{name}.head", [*digest([float(n) for n in NUMBER.findall(head)]), len(head)]
@@ -76,15 +97,15 @@ def study(
     scored: bool = False,
 ) -> Numbers:
     """A scene of the catalogue written and run, and all of the output read; of the score of its own wires, if so."""
-    with tempfile.TemporaryDirectory() as folder, drawn() as looks:
+    with tempfile.TemporaryDirectory() as folder, drawn(TIMED) as looks:
         place = [f"{folder}/study", "--frames", str(frames), "--size", str(size), "--seed", str(seed), "-q"]
         assert main(["synth", scene, "-o", *place, "--insertions", str(insertions)]) == 0
         manifest, out = f"{folder}/study/manifest.toml", f"{folder}/out"
-        main(["run", manifest, "-o", out, "--no-cache", "-q", *settings])
-        if scored:
-            main(["score", manifest, "--curves", f"own={out}", "-o", f"{folder}/scored", "-q"])
-            return {**everything(Path(folder) / "scored"), **looks}
-        return {**everything(Path(out)), **looks}
+        with printed() as words:
+            main(["run", manifest, "-o", out, "--no-cache", *settings])
+            if scored:
+                main(["score", manifest, "--curves", f"own={out}", "-o", f"{folder}/scored"])
+        return {**everything(Path(folder) / "scored" if scored else Path(out)), **looks, **words}
 
 
 SCENES: dict[str, Scene] = {

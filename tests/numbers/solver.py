@@ -100,6 +100,45 @@ def together() -> Numbers:
     }
 
 
+def cut_short() -> Numbers:
+    """Wires bent too far, stopped after the first steps: where these lead shows each derivative that rest hides."""
+    start = np.array([[0, 0, 0], [0, 0.3, 3.0], [0.8, 0.2, 6.0], [2.0, 0, 9.0]])
+    scenes: dict[str, tuple[GuideWire, VesselWall | None]] = {
+        "hooked": (WIRE, bend()),
+        "straight": (GuideWire(1.0, 0.2, TAPER), bend()),
+        "twisting": (GuideWire(1.0, 0.18, TAPER, HOOK, 0.7), bend()),
+        "fork": (WIRE, fork()),
+        "rubbing": (WIRE, bend().like(friction=0.15)),
+        "soft": (GuideWire(1.0, 0.18, 0.02, HOOK, 0.01), bend()),
+        "free": (WIRE, None),
+    }
+    how: dict[str, Any] = {"depth_mm": 9.3, "start_mm": start, "roll_deg": 40.0, "load_N": [0.0, 0.01, -0.002]}
+    return {
+        f"{name}{count}": [s.energy_N_mm, *s.joints_mm[-1], *s.frames[-1, :, 0], s.iterations, *s.counts]
+        for name, (wire, wall) in scenes.items()
+        for count in (1, 2, 4)
+        for s in [relax(wire, wall, **how, max_iterations=count)]
+    }
+
+
+def effort() -> Numbers:
+    """What wires take to come to rest, as far as a run asks for it: steps, look-ups, and what was left out."""
+    twisting, rubs = GuideWire(1.0, 0.18, TAPER, HOOK, 0.7), bend().like(friction=0.15)
+    aside = [1.3, -0.2, 0.0], [0.3, 0.1, 1.0]
+    ways: dict[str, tuple[Insertion, list[float], float]] = {
+        "bend": (Insertion(WIRE, bend(), *CLAMP), [5.3, 11.2, 9.1], 0.0),
+        "fork": (Insertion(WIRE, fork(), *CLAMP), [5.3, 11.2, 9.1], 0.0),
+        "twisting": (Insertion(twisting, bend(), *CLAMP, shaft_mm=200.0), [5.3, 11.2, 9.1], 0.0),
+        # steps of 0.1 mm: short, as they take seconds where nothing is compiled
+        "rubbing": (Insertion(WIRE, rubs, *aside), [2.3, 5.1, 4.6], 0.0),
+        "sheathed": (Insertion(WIRE, rubs, *aside, catheter=Catheter(8.0, 0.5)), [2.3, 5.1, 4.6], 2.2),
+    }
+    return {
+        name: [[s.iterations, *s.counts] for s in way.to_depths(depths, [0.0, 15.0, 30.0], catheter_mm=catheter)]
+        for name, (way, depths, catheter) in ways.items()
+    }
+
+
 def ringed(p: Array) -> Array:
     """A tube with a ring on its wall, on which a curved tip catches and turns back."""
     return np.asarray(np.hypot(p[..., 0], p[..., 1]) - 1.8 + 0.9 * np.exp(-(((p[..., 2] - 12.0) / 0.6) ** 2)))
@@ -144,4 +183,6 @@ SCENES: dict[str, Scene] = {
     "snapping": snapping,
     "looked_up": looked_up,
     "together": together,
+    "cut_short": cut_short,
+    "effort": effort,
 }

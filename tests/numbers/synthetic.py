@@ -97,6 +97,23 @@ def tree() -> Numbers:
     return distances(way_through(Tree(points, radii, np.array(edges))))
 
 
+def grown() -> Numbers:
+    """The way through a trunk with many random branches, of which some lie too far away, and two parts apart."""
+    rng, z = np.random.default_rng(11), np.arange(0.0, 60.0, 1.5)
+    parts, radii = [np.column_stack([4.0 * np.sin(z / 9.0), 0.004 * z**2, z])], [np.linspace(3.6, 0.9, len(z))]
+    edges = [[n, n + 1] for n in range(len(z) - 1)]
+    for branch in range(26):
+        points, first = np.concatenate(parts), sum(map(len, parts))
+        start, count = int(rng.integers(len(points))), int(rng.integers(1, 25))
+        away = rng.standard_normal(3)
+        # both parts apart begin beside the tree
+        begin = points[start] + (4.0 if branch > 23 else 0.0) * away
+        parts.append(begin + np.outer(np.arange(1, count + 1), 1.5 * away / np.linalg.norm(away)))
+        radii.append(rng.uniform(0.6, 1.4) * np.linspace(1.0, 0.8, count))
+        edges += [[start, first]] * (branch < 24) + [[n, n + 1] for n in range(first, first + count - 1)]
+    return distances(way_through(Tree(np.concatenate(parts), np.concatenate(radii), np.array(edges))))
+
+
 def in_a_scan() -> Numbers:
     """A vessel that is found in a scan, one that is painted into it, and the wall of the first."""
     rng = np.random.default_rng(5)
@@ -109,12 +126,15 @@ def in_a_scan() -> Numbers:
     distance, gradient = wall.distance_and_gradient(places)
     way = find_way(vessel.voxels, GRID)
     painted, tube = paint_vessel((20.0 * rng.standard_normal(CUBE.shape)).astype(np.float32), CUBE)
+    even = np.zeros(CUBE.shape, np.float32)
+    even[:3, :3, :3] = 1000.0  # no noise, and too little to be its brightest part
     return {
         "found": [vessel.grey, vessel.background, vessel.voxels.sum()],
         "distance": distance,
         "gradient": digest(gradient),
         "way": [way.length_mm, *digest(way.points_mm), *digest(way.radii_mm)],
         "painted": [*digest(painted), tube.length_mm, *digest(tube.points_mm)],
+        "painted_evenly": digest(paint_vessel(even, CUBE)[0]),
     }
 
 
@@ -131,6 +151,7 @@ SCENES: dict[str, Scene] = {
     "replayed": replayed,
     "rubbing": partial(replayed, 0.2),
     "tree": tree,
+    "grown": grown,
     "in_a_scan": in_a_scan,
     "circle_terminus": lambda: circle("terminus"),
     "circle_acoa": lambda: circle("acoa"),
