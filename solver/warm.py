@@ -13,7 +13,7 @@ import numpy as np
 
 from solver._kernels import closed_form, newton_method
 from solver._kernels.forces import contact_forces, push_force
-from solver._kernels.insertion import next_place, set_out, settle, sum_up
+from solver._kernels.insertion import accept_or_revert, begin_step, collect, next_target
 from solver._kernels.minimise import look_again
 from solver._kernels.septum import through_wall
 from solver._kernels.start import extrapolate_start, lay_along
@@ -55,7 +55,7 @@ def warm_up(*, beside: bool = False) -> None:
             return
         with subprocess.Popen([sys.executable, "-c", "from solver import warm; warm.compile_lanes()"]):
             # each begins with half of what both need: what is not on disk when it is asked for is compiled twice
-            _compile(through_wall, push_force, settle, contact_forces, sum_up)
+            _compile(through_wall, push_force, accept_or_revert, contact_forces, collect)
             _compile(newton_method.iterate, closed_form.iterate)
             relax(WIRE, _wall(), depth_mm=1.0)
 
@@ -63,7 +63,7 @@ def warm_up(*, beside: bool = False) -> None:
 def compile_lanes() -> None:
     """Compile the kernels of insertions that go in lock-step."""
     with no_collection():
-        _compile(next_place, lay_along, set_out, extrapolate_start, newton_method.rest_shape, look_again)
+        _compile(next_target, lay_along, begin_step, extrapolate_start, newton_method.rest_shape, look_again)
         wall = _wall()
         wires = [Insertion(WIRE, wall, [0.0, 0.0, 0.0], [0.0, 0.0, 1.0]) for _ in range(2)]
         Insertions(wires, threads=1).to_depths([1.0])

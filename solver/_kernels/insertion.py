@@ -31,12 +31,12 @@ def advance(handle: Any, to_depth: float, to_roll: float, laid: int) -> tuple[in
     Place, report, force and state 0 of the handle are those of the wire reached.
     laid : number of segments that are laid out already, to be relaxed where they are; 0 to step there.
     """
-    outcome, iterations = go(handle, to_depth, to_roll, laid)
-    return outcome, iterations, sum_up(handle, laid)
+    outcome, iterations = step_until(handle, to_depth, to_roll, laid)
+    return outcome, iterations, collect(handle, laid)
 
 
 @cached
-def sum_up(handle: Any, laid: int) -> int:
+def collect(handle: Any, laid: int) -> int:
     """Fill force and report of the wire reached; return its number of segments."""
     k, _ = segments_at(handle.place[0].inserted, handle.table.segment)
     problem, report, force = handle.problem, handle.report[0], handle.force
@@ -52,16 +52,16 @@ def sum_up(handle: Any, laid: int) -> int:
 
 
 @merged
-def go(handle: Any, to_depth: float, to_roll: float, laid: int) -> tuple[int, int]:
+def step_until(handle: Any, to_depth: float, to_roll: float, laid: int) -> tuple[int, int]:
     """Step until the goal is reached or no step succeeds; return the outcome and the iterations."""
     limit = prepare(handle, to_depth, to_roll)
     outcome, iterations = data.CONVERGED, 0
-    while laid > 0 or not arrived(handle.place[0], to_depth, to_roll):
+    while laid > 0 or not at_goal(handle.place[0], to_depth, to_roll):
         outcome, used = step(handle, to_depth, to_roll, laid)
         iterations += used
         if laid > 0:
             break
-        goes_on, outcome = judge(handle, outcome, iterations, limit)
+        goes_on, outcome = adapt_step(handle, outcome, iterations, limit)
         if not goes_on:
             break
     handle.place[0].shrink = max(handle.place[0].shrink, 8 * tol.SMALLEST_STEP)
@@ -73,7 +73,7 @@ def prepare(handle: Any, to_depth: float, to_roll: float) -> float:
     """Get ready for a goal; return how many iterations it may take: a cap on the time of a hopeless scene."""
     at, introducer = handle.place[0], handle.introducer
     at.rubbed, at.dissipated, at.snaps, at.seen_depth, at.resigned = 0.0, 0.0, 0, math.nan, 0.0
-    if turns_back(handle, to_depth - at.inserted, to_roll - at.roll):
+    if reverses(handle, to_depth - at.inserted, to_roll - at.roll):
         at.shrink = min(at.shrink, tol.REFINE * introducer.finest)
     steps = abs(to_depth - at.inserted) / introducer.step + abs(to_roll - at.roll) / introducer.turn
     steps += abs(at.goal - at.catheter) / introducer.step
@@ -84,7 +84,7 @@ def prepare(handle: Any, to_depth: float, to_roll: float) -> float:
 
 
 @merged
-def turns_back(handle: Any, ahead: float, turn: float) -> bool:
+def reverses(handle: Any, ahead: float, turn: float) -> bool:
     """Whether the hand moves the wire in another direction than before: friction on it then changes within micrometres.
 
     Over a step in which that happens the trapezium rule does not give the hand's work. ahead, turn : mm, degrees.
@@ -99,13 +99,13 @@ def turns_back(handle: Any, ahead: float, turn: float) -> bool:
 
 
 @inlined
-def arrived(at: Any, depth: float, roll: float) -> bool:
+def at_goal(at: Any, depth: float, roll: float) -> bool:
     """Whether wire, roll and catheter are where they are to go."""
     return bool(abs(depth - at.inserted) < tol.MATCH_DEPTH_MM and at.roll == roll and at.catheter == at.goal)
 
 
 @merged
-def judge(handle: Any, outcome: int, iterations: int, limit: float) -> tuple[bool, int]:
+def adapt_step(handle: Any, outcome: int, iterations: int, limit: float) -> tuple[bool, int]:
     """Whether to take another step after one with this outcome, and the outcome if not; adapts the step's length."""
     at = handle.place[0]
     if iterations > limit or handle.problem.scratch.counters[0].passed >= handle.limits.work:
@@ -139,22 +139,22 @@ def step(handle: Any, to_depth: float, to_roll: float, laid: int) -> tuple[int, 
             copy_state(problem, data.CURRENT, data.LAST_GOOD, k)
             anchor_friction(problem, k, k, 0.0, 0.0)
     else:
-        depth, roll = next_place(handle, to_depth, to_roll)
-        k = set_out(handle, depth, roll)
+        depth, roll = next_target(handle, to_depth, to_roll)
+        k = begin_step(handle, depth, roll)
     outcome, used, most, energy, other = data.CONVERGED, 0, 0, 0.0, 0.0
     if k > 0:
         weigh(problem.chain, handle.introducer.weight, k)
-        start = extrapolate_start(problem, at, k, likeness(problem, at, depth, roll))
+        start = extrapolate_start(problem, at, k, extrapolation_factor(problem, at, depth, roll))
         outcome, used, most, energy = relax_with_friction(problem, start, k, handle.limits, handle.report[0])
         if start != data.CURRENT:
             copy_state(problem, start, data.CURRENT, k)
         if outcome == data.CONVERGED and laid == 0 and may_fork(handle, k, depth, most):
             other = other_side(handle, k)
-    return settle(handle, (depth, roll, energy), k, outcome, laid, most, other), used
+    return accept_or_revert(handle, (depth, roll, energy), k, outcome, laid, most, other), used
 
 
 @cached
-def settle(
+def accept_or_revert(
     handle: Any, reached: tuple[float, float, float], k: int, outcome: int, laid: int, used: int, other: float
 ) -> int:
     """Keep the wire where a step led it, or take the step back where it failed; return the outcome.
@@ -165,7 +165,7 @@ def settle(
     problem, at, (depth, roll, energy) = handle.problem, handle.place[0], reached
     energy -= problem.state.energies[data.CURRENT].friction
     if outcome == data.CONVERGED and problem.stiffness > 0.0:
-        outcome = where(problem, handle.introducer.margin, k, laid)
+        outcome = classify(problem, handle.introducer.margin, k, laid)
     # without a catheter its table is not asked for: to take it out of the handle costs 3 % of a step
     stored = stored_energy(handle.table, depth) if at.next != 0.0 else 0.0
     energy += stored
@@ -188,12 +188,12 @@ def settle(
             at.rubbed += slid
             at.dissipated += slid
     else:
-        take_back(handle)
+        revert(handle)
     return outcome
 
 
 @merged
-def where(problem: Problem, margin: float, k: int, laid: int) -> int:
+def classify(problem: Problem, margin: float, k: int, laid: int) -> int:
     """Judge where a wire at rest lies: LEFT_GRID, THROUGH_WALL, or CONVERGED where it may lie there."""
     field, x = problem.field, problem.state.x[data.CURRENT]
     if laid == 0 and furthest_outside(field, x, k) > margin:
@@ -202,14 +202,14 @@ def where(problem: Problem, margin: float, k: int, laid: int) -> int:
 
 
 @cached
-def next_place(handle: Any, to_depth: float, to_roll: float) -> tuple[float, float]:
+def next_target(handle: Any, to_depth: float, to_roll: float) -> tuple[float, float]:
     """Depth, mm, and roll, degrees, that the next step leads to; a catheter goes on in proportion."""
     at, goal = handle.place[0], handle.place[0].goal
     if not math.isnan(at.seen_depth):
         # to where a rough step led, for the two ways to be compared there
         to_depth, to_roll, goal = at.seen_depth, at.seen_roll, at.seen_catheter
     ahead, turn = to_depth - at.inserted, to_roll - at.roll
-    longest = allowed(handle.problem, handle.table, handle.introducer, at.inserted, ahead, turn)
+    longest = longest_step(handle.problem, handle.table, handle.introducer, at.inserted, ahead, turn)
     if goal != at.catheter:
         longest = min(longest, handle.introducer.step / abs(goal - at.catheter))
     longest *= at.shrink
@@ -220,7 +220,7 @@ def next_place(handle: Any, to_depth: float, to_roll: float) -> tuple[float, flo
 
 
 @merged
-def allowed(
+def longest_step(
     problem: Problem, table: WireTable, introducer: Introducer, depth: float, ahead: float, turn: float
 ) -> float:
     """Fraction of the way that one step may take: the longest step and roll, and what the tip can see."""
@@ -239,7 +239,7 @@ def allowed(
 
 
 @inlined
-def likeness(problem: Problem, at: Any, depth: float, roll: float) -> float:
+def extrapolation_factor(problem: Problem, at: Any, depth: float, roll: float) -> float:
     """Share of the last step's change to start with: this step's length over its, MOST_FORESEEN at most; 0 where it is
     of another kind.
     """
@@ -249,7 +249,7 @@ def likeness(problem: Problem, at: Any, depth: float, roll: float) -> float:
 
 
 @cached
-def set_out(handle: Any, depth: float, roll: float) -> int:
+def begin_step(handle: Any, depth: float, roll: float) -> int:
     """Keep the last good state and lay the wire out at a new depth and roll; return its number of segments."""
     problem, table, introducer = handle.problem, handle.table, handle.introducer
     inserted, report = handle.place[0].inserted, handle.report[0]
@@ -274,7 +274,7 @@ def set_out(handle: Any, depth: float, roll: float) -> int:
 
 
 @merged
-def take_back(handle: Any) -> None:
+def revert(handle: Any) -> None:
     """Put the last good state back."""
     was, first = segments_at(handle.place[0].inserted, handle.table.segment)
     handle.table.sleeve.tip[0] = handle.place[0].catheter

@@ -14,7 +14,16 @@ from solver._kernels.energy import energy_of, load_moved, stiffest
 from solver._kernels.flags import kernel, merged, released
 from solver._kernels.forces import copy_state, forget_forces
 from solver._kernels.forks import back_again, turned_aside
-from solver._kernels.insertion import arrived, judge, likeness, next_place, prepare, set_out, settle, sum_up
+from solver._kernels.insertion import (
+    accept_or_revert,
+    adapt_step,
+    at_goal,
+    begin_step,
+    collect,
+    extrapolation_factor,
+    next_target,
+    prepare,
+)
 from solver._kernels.lanes.block import Block
 from solver._kernels.lanes.decide import ALONE, DONE, IDLE, NEW, READY, RESTED, STOPPED, SWEEP, WAITING
 from solver._kernels.lanes.relax import POOL, Team, do_round, hand_over, take_over
@@ -130,12 +139,12 @@ def proceed(team: Team, plan: Plan, w: int) -> None:
     now = problem.scratch.descent[0]
     while me.phase != IDLE:
         depth, roll = plan.goal[w, me.goal, 0], plan.goal[w, me.goal, 1]
-        if me.phase == STOPPED or arrived(at, depth, roll):
+        if me.phase == STOPPED or at_goal(at, depth, roll):
             write_down(team, plan, w)
             next_goal(team, plan, w)
             continue
-        me.depth, me.roll = next_place(wire, depth, roll)
-        me.k = set_out(wire, me.depth, me.roll)
+        me.depth, me.roll = next_target(wire, depth, roll)
+        me.k = begin_step(wire, me.depth, me.roll)
         me.outcome, now.iterations, now.energy = data.CONVERGED, 0, 0.0
         if (me.k > 0 and start_relaxing(me, now, wire, team.desk, report)) or end_step(me, now, wire, problem):
             return
@@ -145,7 +154,7 @@ def proceed(team: Team, plan: Plan, w: int) -> None:
 def start_relaxing(me: Any, now: Any, wire: Any, desk: Desk, report: Any) -> bool:
     """Choose the start of a step's relaxation; False where it rests as it is, or cannot be relaxed."""
     at, problem = wire.place[0], wire.problem
-    start = chosen_start(problem, desk, at, me.k, likeness(problem, at, me.depth, me.roll))
+    start = chosen_start(problem, desk, at, me.k, extrapolation_factor(problem, at, me.depth, me.roll))
     return begin_relaxing(me, now, wire, start, report)
 
 
@@ -177,7 +186,7 @@ def begin_relaxing(me: Any, now: Any, wire: Any, start: int, report: Any) -> boo
 def end_step(me: Any, now: Any, wire: Any, problem: Problem) -> bool:
     """End a relaxation as ``minimise.relax_with_friction`` and ``insertion.step`` do; True where another one follows.
 
-    That is the one on the other side. Without it the step is kept or taken back, as in ``insertion.go``.
+    That is the one on the other side. Without it the step is kept or taken back, as in ``insertion.step_until``.
     """
     problem.scratch.counters[0].passed += now.iterations * (me.k + problem.chain.first[me.k + 1])
     if me.k > 0 and me.outcome == data.CONVERGED:
@@ -193,8 +202,8 @@ def end_step(me: Any, now: Any, wire: Any, problem: Problem) -> bool:
     if me.aside:
         other = back_again(wire, me.k, me.outcome, me.energy, now.energy)
         me.aside, me.outcome = 0, data.CONVERGED
-    outcome = settle(wire, (me.depth, me.roll, me.energy), me.k, me.outcome, 0, me.used, other)
-    goes_on, me.outcome = judge(wire, outcome, me.iterations, me.limit)
+    outcome = accept_or_revert(wire, (me.depth, me.roll, me.energy), me.k, me.outcome, 0, me.used, other)
+    goes_on, me.outcome = adapt_step(wire, outcome, me.iterations, me.limit)
     me.phase = READY if goes_on else STOPPED
     return False
 
@@ -205,7 +214,7 @@ def write_down(team: Team, plan: Plan, w: int) -> None:
     me, wire = team.lanes[w], team.wires[w]
     state, counters, goal = wire.problem.state, wire.problem.scratch.counters[0], me.goal
     wire.place[0].shrink = max(wire.place[0].shrink, 8 * tol.SMALLEST_STEP)
-    k = sum_up(wire, 0)
+    k = collect(wire, 0)
     counted = team.counts[w]
     counters.sweeps += counted.sweeps
     counters.rollouts += counted.rollouts
