@@ -27,17 +27,25 @@ class Blurred(NamedTuple):
 
 
 @kernel
-def _weights(x: float, h: float, sigma: float, n: int, w: NDArray[Any]) -> tuple[int, int]:
-    """Nodes' weights for value, first and second derivative at x, into rows of ``w``; returns first and stop node."""
-    s = max(sigma, 0.6 * h)
+def _bell(x: float, h: float, s: float, n: int, w: NDArray[Any]) -> tuple[int, int, float]:
+    """A Gaussian of deviation ``s`` about x at the nodes, into ``w``; returns first and stop node and its sum."""
     first, stop = nodes_near(x, x, REACH * s, h, n)
-    stop = min(stop, first + w.shape[1])
+    stop = min(stop, first + w.shape[0])
     total = 0.0
     for i in range(first, stop):
         d = (i * h - x) / s
-        g = np.exp(-0.5 * d * d)
-        total += g
-        w[0, i - first] = g
+        w[i - first] = np.exp(-0.5 * d * d)
+        total += w[i - first]
+    return first, stop, total
+
+
+@kernel
+def _weights(x: float, h: float, sigma: float, n: int, w: NDArray[Any]) -> tuple[int, int]:
+    """Nodes' weights for value, first and second derivative at x, into rows of ``w``; returns first and stop node."""
+    s = max(sigma, 0.6 * h)
+    first, stop, total = _bell(x, h, s, n, w[0])
+    for i in range(first, stop):
+        d, g = (i * h - x) / s, w[0, i - first]
         w[1, i - first] = g * d / s
         w[2, i - first] = g * (d * d - 1.0) / (s * s)
     if total > 0.0:
@@ -101,14 +109,7 @@ def jets_at(field: Blurred, points: NDArray[Any]) -> NDArray[Any]:
 @kernel
 def _shares(x: float, h: float, sigma: float, n: int, w: NDArray[Any]) -> tuple[int, int]:
     """The weights of ``_weights`` for the value alone."""
-    s = max(sigma, 0.6 * h)
-    first, stop = nodes_near(x, x, REACH * s, h, n)
-    stop = min(stop, first + w.shape[0])
-    total = 0.0
-    for i in range(first, stop):
-        d = (i * h - x) / s
-        w[i - first] = np.exp(-0.5 * d * d)
-        total += w[i - first]
+    first, stop, total = _bell(x, h, max(sigma, 0.6 * h), n, w)
     if total > 0.0:
         for i in range(stop - first):
             w[i] /= total
