@@ -75,7 +75,10 @@ def ball_distance(
 
 @on_disk()
 def foot(p: Vector, sample: int, t: int, tubes: TubeTables) -> float:
-    """Where f of tube t is least near ``sample``: the one zero of f' there (f is convex), by modified regula falsi."""
+    """Where f of tube t is least near ``sample``: the one zero of f' there (f is convex), by the Illinois method.
+
+    The value at an end is halved when it stays for the second time: 5 steps. Halved every time, it takes 27.
+    """
     first, last, step = tubes.starts[t], tubes.starts[t + 1], tubes.steps[t]
     lo: float = max(sample - first - 1, 0) * 1.0
     hi: float = min(sample - first + 1, last - 1 - first) - 1e-12
@@ -86,6 +89,7 @@ def foot(p: Vector, sample: int, t: int, tubes: TubeTables) -> float:
     if fhi <= 0.0:
         return hi
     s: float = lo
+    side = 0
     for _ in range(60):
         s = lo + (hi - lo) * flo / (flo - fhi)
         width = hi - lo
@@ -95,11 +99,13 @@ def foot(p: Vector, sample: int, t: int, tubes: TubeTables) -> float:
         if f < 0.0:
             shift = s - lo
             lo, flo = s, f
-            fhi *= 0.5
+            fhi *= 0.5 if side < 0 else 1.0
+            side = -1
         else:
             shift = hi - s
             hi, fhi = s, f
-            flo *= 0.5
+            flo *= 0.5 if side > 0 else 1.0
+            side = 1
         if shift * step < FOOT_TOLERANCE_MM or width * step < FOOT_TOLERANCE_MM:
             break
     return s
@@ -167,3 +173,75 @@ def distances(points: Array, tubes: TubeTables, out: Array, gradients: Array) ->
         f, gx, gy, gz = union_distance((points[i, 0], points[i, 1], points[i, 2]), FAR, tubes)
         out[i] = f
         gradients[i, 0], gradients[i, 1], gradients[i, 2] = gx, gy, gz
+
+
+@on_disk()
+def room_for(tubes: TubeTables) -> TubeTables:
+    """Tables that ``tubes_around`` writes into; where its runs of samples fill no block, each has one of its own."""
+    return TubeTables(
+        np.empty_like(tubes.points),
+        np.empty_like(tubes.tangents),
+        np.empty_like(tubes.radii),
+        np.empty_like(tubes.slopes),
+        np.zeros_like(tubes.starts),
+        np.empty_like(tubes.steps),
+        np.empty_like(tubes.blends),
+        np.empty((len(tubes.balls) + len(tubes.steps), 4)),
+        np.zeros_like(tubes.block_starts),
+    )
+
+
+@on_disk()
+def samples_around(p: Vector, reach: float, t: int, limit: float, tubes: TubeTables) -> tuple[int, int]:
+    """The first sample of tube t, and the one after the last, that may count within ``reach`` of p; none: (0, 0)."""
+    first, last = tubes.starts[t], tubes.starts[t + 1]
+    nearest = nearest_sample(p, t, limit, tubes)
+    if nearest < 0:
+        return 0, 0
+    c, r = tubes.points, tubes.radii
+    # the distance to a sample changes by no more than ``reach``, and so does that to the nearest one
+    dx, dy, dz = p[0] - c[nearest, 0], p[1] - c[nearest, 1], p[2] - c[nearest, 2]
+    most = np.sqrt(dx * dx + dy * dy + dz * dz) - r[nearest] + 2.0 * reach + FOOT_TOLERANCE_MM
+    low = high = nearest
+    for k in range(tubes.block_starts[t], tubes.block_starts[t + 1]):
+        dx, dy, dz = p[0] - tubes.balls[k, 0], p[1] - tubes.balls[k, 1], p[2] - tubes.balls[k, 2]
+        if np.sqrt(dx * dx + dy * dy + dz * dz) - tubes.balls[k, 3] > most:
+            continue
+        a = first + (k - tubes.block_starts[t]) * BLOCK
+        for i in range(a, min(a + BLOCK + 1, last)):
+            dx, dy, dz = p[0] - c[i, 0], p[1] - c[i, 1], p[2] - c[i, 2]
+            if np.sqrt(dx * dx + dy * dy + dz * dz) - r[i] <= most:
+                low, high = min(low, i), max(high, i)
+    # the foot is looked for between a sample's neighbours
+    return max(low - 1, first), min(high + 2, last)
+
+
+@on_disk()
+def tubes_around(p: Vector, reach: float, limit: float, tubes: TubeTables, room: TubeTables) -> TubeTables:
+    """The part of the tables that gives the distance within ``reach`` of p, where it is below ``limit``."""
+    count = samples = blocks = 0
+    for t in range(len(tubes.steps)):
+        low, high = samples_around(p, reach, t, limit + reach, tubes)
+        if low == high:
+            continue
+        for i in range(low, high):
+            room.points[samples], room.tangents[samples] = tubes.points[i], tubes.tangents[i]
+            room.radii[samples], room.slopes[samples] = tubes.radii[i], tubes.slopes[i]
+            samples += 1
+        room.steps[count], room.blends[count] = tubes.steps[t], tubes.blends[t]
+        for _ in range(max((high - low + BLOCK - 2) // BLOCK, 1)):
+            room.balls[blocks] = (p[0], p[1], p[2], FAR)  # all of them are near
+            blocks += 1
+        count += 1
+        room.starts[count], room.block_starts[count] = samples, blocks
+    return TubeTables(
+        room.points[:samples],
+        room.tangents[:samples],
+        room.radii[:samples],
+        room.slopes[:samples],
+        room.starts[: count + 1],
+        room.steps[:count],
+        room.blends[:count],
+        room.balls[:blocks],
+        room.block_starts[: count + 1],
+    )

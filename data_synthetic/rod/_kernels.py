@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from data_synthetic._compile import on_disk
-from data_synthetic.geometry import Array
+from data_synthetic.geometry import Array, Index
 
 Vector = tuple[float, float, float]
 
@@ -199,6 +199,19 @@ def elastic_system(shape: Shape, rod: Elastic, gradient: Array, bands: Array) ->
             for b in range(3):
                 h[4 + a, 4 + b] += stiffness * (1.0 - strain) * q[4 + a] * q[4 + b] / (length * length)
         scatter(v, g, h, gradient, bands)
+
+
+@on_disk()
+def add_blocks(bands: Array, low: Index, high: Index, block: Array) -> None:
+    """Add blocks (n, 3, 3) for pairs of nodes low <= high to the lower bands; node 0 is clamped and has no unknowns."""
+    for n in range(len(low)):
+        if low[n] <= 0:
+            continue
+        row, column = 4 * (high[n] - 1) + 1, 4 * (low[n] - 1) + 1
+        for a in range(3):
+            for b in range(3):
+                if row + a >= column + b:
+                    bands[row + a - column - b, column + b] += block[n, a, b]
 
 
 @on_disk()

@@ -7,7 +7,8 @@ as that, the wall's energy would depend on where the nodes happen to lie, and th
 import numpy as np
 
 from data_synthetic.geometry import Array, Index
-from data_synthetic.rod.rod import Rod, Wall, add_blocks
+from data_synthetic.rod._kernels import add_blocks
+from data_synthetic.rod.rod import Rod, Wall
 
 PLACES, WEIGHTS = (0.5 * (v + shift) for v, shift in zip(np.polynomial.legendre.leggauss(4), (1.0, 0.0), strict=True))
 """Gauss points of an edge, as shares of it, and their weights, which add up to one."""

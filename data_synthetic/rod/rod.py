@@ -7,22 +7,11 @@ import numpy as np
 
 from data_synthetic.anatomy.iso_wall import IsoWall
 from data_synthetic.anatomy.tubes import Anatomy
-from data_synthetic.geometry import Array, Index, ends_of
-from data_synthetic.rod._kernels import Elastic, Shape, carry
+from data_synthetic.geometry import Array, ends_of
+from data_synthetic.rod._kernels import Elastic, Shape, add_blocks, carry
 
 ELASTIC_SLIP_MM = 2e-3
 """A slider gives by this much before it slips: a fifth of the truth's own accuracy of 0.01 mm."""
-
-
-def add_blocks(bands: Array, low: Index, high: Index, block: Array) -> None:
-    """Add blocks (n, 3, 3) for pairs of nodes low <= high to the lower bands; node 0 is clamped and has no unknowns."""
-    free = low > 0
-    low, high, block = low[free], high[free], block[free]
-    for a in range(3):
-        for b in range(3):
-            row, column = 4 * (high - 1) + 1 + a, 4 * (low - 1) + 1 + b
-            lower = row >= column
-            np.add.at(bands, ((row - column)[lower], column[lower]), block[lower, a, b])
 
 
 @dataclass(frozen=True, eq=False)

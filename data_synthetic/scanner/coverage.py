@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from data_synthetic._compile import on_disk
-from data_synthetic.anatomy._kernels import FAR, TubeTables, union_distance
+from data_synthetic.anatomy._kernels import FAR, TubeTables, room_for, tubes_around, union_distance
 from data_synthetic.anatomy.tubes import Anatomy
 from data_synthetic.geometry import Array, Index, ScanGrid, Volume, arc_lengths, at_arc, voxels_near
 from data_synthetic.scanner.phantom import Phantom
@@ -72,13 +72,11 @@ def fill_coverage(
 ) -> None:
     """Coverage (n,) of listed voxels (n, 3).
 
-    axes (3, 3) : index steps in mm.     offsets (m, 3) : of sub-voxels from a voxel's centre, mm.
+    axes (3, 3) : index steps in mm.     offsets (8, m, 3) : of sub-voxels from a voxel's centre by its octants, mm.
     reach : half a voxel's diagonal, mm.
     """
-    # within a sub-voxel the wall is taken as a plane: no grain where it is parallel to a face
-    cell = 2.0 * reach / np.sqrt(3.0) / SUBSAMPLES
     # the distance changes by no more than the way between two places: tubes further off are not looked at
-    f, before, margin = FAR, origin, BLENDS * tubes.blends.max()
+    f, before, margin, room = FAR, origin, BLENDS * tubes.blends.max(), room_for(tubes)
     for n in range(len(index)):
         p = origin + axes @ index[n].astype(np.float64)
         way = p - before
@@ -87,11 +85,30 @@ def fill_coverage(
         if abs(f) > reach:
             out[n] = 1.0 if f < 0 else 0.0
             continue
-        inside = 0.0
-        for q in offsets:
-            g = union_distance((p[0] + q[0], p[1] + q[1], p[2] + q[2]), f + reach + margin, tubes)[0]
+        limit = f + reach + margin
+        near = tubes_around((p[0], p[1], p[2]), reach, limit, tubes, room)
+        out[n] = share_inside(p, offsets, reach, limit, near)
+
+
+@on_disk()
+def share_inside(p: Array, offsets: Array, reach: float, limit: float, tubes: TubeTables) -> float:
+    """Share inside of a voxel that the wall crosses; arguments as of ``fill_coverage``."""
+    # within a sub-voxel the wall is taken as a plane: no grain where it is parallel to a face
+    cell = 2.0 * reach / np.sqrt(3.0) / SUBSAMPLES
+    inside, m = 0.0, offsets.shape[1]
+    for octant in offsets:
+        middle = octant.sum(axis=0) / m
+        way = octant[0] - middle
+        x, y, z = p[0] + middle[0], p[1] + middle[1], p[2] + middle[2]
+        g = union_distance((x, y, z), limit, tubes)[0]
+        # sub-voxels lie that far from the middle of their octant: each of them is whole or empty
+        if abs(g) > np.sqrt((way * way).sum()) + 0.5 * cell:
+            inside += m if g < 0.0 else 0.0
+            continue
+        for q in octant:
+            g = union_distance((p[0] + q[0], p[1] + q[1], p[2] + q[2]), limit, tubes)[0]
             inside += min(max(0.5 - g / cell, 0.0), 1.0)
-        out[n] = inside / len(offsets)
+    return inside / offsets[:, :, 0].size
 
 
 def near_tubes(anatomy: Anatomy, grid: ScanGrid, margin_mm: float) -> Index:
@@ -108,7 +125,11 @@ def lumen_coverage(anatomy: Anatomy, grid: ScanGrid) -> Volume:
     index = near_tubes(anatomy, grid, reach + blend)
     share, axes = np.empty(len(index), dtype=np.float32), grid.direction * grid.spacing_mm
     steps = (np.arange(SUBSAMPLES) + 0.5) / SUBSAMPLES - 0.5
-    i, j, k = (step.reshape(-1, 1) for step in np.meshgrid(steps, steps, steps, indexing="ij"))
+    half = SUBSAMPLES // 2
+    i, j, k = (  # eight octants, then the sub-voxels in each
+        step.reshape(2, half, 2, half, 2, half).transpose(0, 2, 4, 1, 3, 5).reshape(8, -1, 1)
+        for step in np.meshgrid(steps, steps, steps, indexing="ij")
+    )
     offsets = axes[:, 0] * i + axes[:, 1] * j + axes[:, 2] * k
     fill_coverage(index, grid.origin_mm, axes, offsets, reach, anatomy.tables, share)
     out = np.zeros(grid.shape, dtype=np.float32)
