@@ -86,6 +86,20 @@ class Lattice:
         axes = [o + h * np.arange(n) for o, h, n in zip(self.origin, self.spacing, self.shape, strict=True)]
         return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
 
+    def near(self, points, limit, block=6):
+        """Flat indices of voxels within ``limit`` of points, and their centres; of far blocks no voxel is looked at."""
+        tree = cKDTree(points)
+        index = np.stack(np.meshgrid(*(np.arange(0, n, block) for n in self.shape), indexing="ij"), axis=-1)
+        half = 0.5 * (block - 1) * self.spacing
+        away = tree.query(self.origin + self.spacing * index + half, distance_upper_bound=limit + np.linalg.norm(half))
+        voxels = np.isfinite(away[0])
+        for axis, n in enumerate(self.shape):
+            voxels = np.repeat(voxels, block, axis=axis).take(np.arange(n), axis=axis)
+        flat = np.flatnonzero(voxels)
+        centres = self.origin + self.spacing * np.stack(np.unravel_index(flat, self.shape), axis=-1)
+        found = np.isfinite(tree.query(centres, distance_upper_bound=limit)[0])
+        return flat[found], centres[found]
+
 
 @lru_cache(maxsize=1)
 def _cylinders():
@@ -110,12 +124,9 @@ def vessel(lattice, axis, radius, level=1.0):
     """Grey share (shape) of a vessel along ``axis`` (n, 3) of radius and level (n,) or numbers, ends round."""
     radius, level = (np.broadcast_to(np.asarray(v, float), len(axis)) for v in (radius, level))
     sigma = float(np.prod(lattice.sigma) ** (1 / 3))
-    points = lattice.centres()
-    limit = radius.max() + 4 * sigma
-    coarse = cKDTree(axis[::10]).query(points, distance_upper_bound=limit + 0.6)[0]
-    near = np.flatnonzero(np.isfinite(coarse))
-    away, at = cKDTree(axis).query(points[near])
-    out = np.zeros(len(points), np.float32)
+    near, points = lattice.near(axis[::10], radius.max() + 4 * sigma + 0.6)
+    away, at = cKDTree(axis).query(points)
+    out = np.zeros(int(np.prod(lattice.shape)), np.float32)
     out[near] = level[at] * cylinder(radius[at], away, sigma)
     return out.reshape(lattice.shape)
 
