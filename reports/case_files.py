@@ -243,7 +243,8 @@ def runs_in(out_dir: Path) -> list[dict[str, Any]]:
 
 
 def _began(run: Path) -> str:
-    return str(read_json(run.with_name(run.name.replace("run", "provenance"))).get("started", ""))
+    """When a run began, ISO 8601; of one that does not say it, later than all: what it says is to be heeded."""
+    return str(read_json(run.with_name(run.name.replace("run", "provenance"))).get("started", "~"))
 
 
 def _folders(out_dir: Path, named: bool) -> list[Path]:
