@@ -15,6 +15,8 @@ from reports.pdf import write_pdf
 from reports.pdf_page import BOTTOM, Page
 from reports.schema import SUMMARY
 from tests.reports.fake_results import FakeCase, write_run
+from tests.unseen import undrawn
+from tests.unseen import unseen as unseen
 
 
 def test_four_pages_say_verdict_failures_and_the_worst_case(tmp_path: Path) -> None:
@@ -24,7 +26,8 @@ def test_four_pages_say_verdict_failures_and_the_worst_case(tmp_path: Path) -> N
     assert len(re.findall(rb"/Type /Page\b", first)) == 4
     assert write_pdf(out).read_bytes() == first
     summary = tables.read(out / "summary.csv", SUMMARY)
-    pages = [" ".join(text.get_text() for text in page.figure.texts) for page in pdf._pages(out, summary)]
+    with undrawn():
+        pages = [" ".join(text.get_text() for text in page.figure.texts) for page in pdf._pages(out, summary)]
     said = (
         ("5 of 6 frames", "0.250 mm", "frame 1: no_wire", "--only poor"),
         ("Cases side by side", "poor: Skill against trivial predictors"),
@@ -35,6 +38,7 @@ def test_four_pages_say_verdict_failures_and_the_worst_case(tmp_path: Path) -> N
         assert not [word for word in words if word not in page], page
 
 
+@pytest.mark.usefixtures("unseen")
 def test_worst_is_the_same_on_every_page(tmp_path: Path) -> None:
     """One page called the only case that was ok the worst, and the next had it last, below one without any result."""
     cases = (FakeCase("far", frames=3, error_mm=0.9), FakeCase("poor", frames=3, failed=(1,)))
@@ -49,6 +53,7 @@ def test_worst_is_the_same_on_every_page(tmp_path: Path) -> None:
     assert re.findall("none|poor|far|fine", pages[3].partition("skill_strongest")[2])[:4] == summary["case"].tolist()
 
 
+@pytest.mark.usefixtures("unseen")
 def test_warnings_and_assumptions_are_whole(tmp_path: Path) -> None:
     """They were cut off after two lines, and the pages beside them half empty."""
     out = write_run(tmp_path / "out", [FakeCase(name, frames=2) for name in "ab"])
@@ -86,7 +91,8 @@ def test_a_run_without_errors_has_its_four_pages(tmp_path: Path, cases: tuple[Fa
 def test_figures_have_200_dots_an_inch_and_fill_their_pages(tmp_path: Path) -> None:
     """They were those of the screen, 100 dots an inch, and the first two pages of a small run half empty."""
     out = write_run(tmp_path / "out", (FakeCase("fine", frames=5), FakeCase("poor", frames=4, error_mm=0.6)))
-    pages = list(pdf._pages(out, tables.read(out / "summary.csv", SUMMARY)))
+    with undrawn():
+        pages = list(pdf._pages(out, tables.read(out / "summary.csv", SUMMARY)))
     for page in pages:
         for axes in page.figure.axes:
             (picture,) = axes.images
