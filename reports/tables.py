@@ -47,10 +47,10 @@ def write(path: Path, table: Table, content: pd.DataFrame | Mapping[str, Any] | 
         for row in rows:
             table.check(row, path.name)
         content = pd.DataFrame(rows, columns=list(table.names), dtype=object)
-    whole, floats = _conform(content, table), [column.name for column in table if column.kind == "float"]
+    whole = _columns(content, table)
     # -0.0 + 0.0 is 0.0: a force of "-0" is no news to a reader and would not survive a spreadsheet
-    whole[floats] = whole[floats] + 0.0
-    write_csv(path, whole)
+    whole |= {column.name: whole[column.name] + 0.0 for column in table if column.kind == "float"}
+    write_csv(path, pd.DataFrame(whole, index=content.index))
 
 
 def write_csv(path: Path, content: pd.DataFrame) -> None:
@@ -125,6 +125,14 @@ def _conform(content: pd.DataFrame, table: Table) -> pd.DataFrame:
     kinds = whole.dtypes.to_dict()
     wrong = [column for column in table if kinds[column.name] != _DTYPES[column.kind]]
     return whole.assign(**{column.name: _typed(content, column) for column in wrong})
+
+
+def _columns(content: pd.DataFrame, table: Table) -> "dict[str, pd.Series[Any]]":
+    """The same by name: where few columns are in their kinds, a frame made of all at once takes half the time."""
+    kinds = content.dtypes.to_dict()
+    right = {c.name for c in table if c.name in kinds and kinds[c.name] == _DTYPES[c.kind]}
+    whole = {c.name: content[c.name] if c.name in right else _typed(content, c) for c in table}
+    return whole | {name: content[name] for name in content.columns if name not in whole}
 
 
 def _typed(content: pd.DataFrame, column: Column) -> "pd.Series[Any]":
