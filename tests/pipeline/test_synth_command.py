@@ -166,7 +166,7 @@ def test_friction_of_the_true_wire_is_in_its_truth_and_its_manifest(tmp_path: Pa
 @pytest.mark.parametrize("how", [signal.SIGTERM, signal.SIGKILL])
 def test_no_process_outlives_the_command(how: signal.Signals, tmp_path: Path) -> None:
     """Insertions were drawn to their end, minutes after the command had been ended."""
-    words = ["synth", "circle-of-willis", "-o", str(tmp_path), "--insertions", "4", "--size", "192", "-j", "2"]
+    words = ["synth", "circle-of-willis", "-o", str(tmp_path), "--insertions", "16", "--size", "192", "-j", "2"]
     command = subprocess.Popen([sys.executable, "-m", "pipeline", *words], stderr=subprocess.DEVNULL)
     children = Path(f"/proc/{command.pid}/task/{command.pid}/children")
     _until(lambda: bool(children.read_text(encoding="ascii").split()))
