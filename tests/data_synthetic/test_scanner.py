@@ -48,14 +48,14 @@ def test_coverage_looks_at_every_tube_that_counts() -> None:
     """What the distance to all tubes gives, to the last digit of a float32, in a tree whose branches blend."""
     tree = circle_of_willis(np.random.default_rng(3), WillisPlan())
     middle = 0.5 * (tree.tables.points.min(axis=0) + tree.tables.points.max(axis=0))
-    grid = centred_grid(middle, (64, 64, 64), 1.2)
+    grid = centred_grid(middle, (96, 96, 96), 0.9)
     share = lumen_coverage(tree, grid)
     index = np.argwhere((share > 0) & (share < 1))
-    assert len(index) > 1000
-    inside, steps = np.zeros(len(index)), 1.2 * ((np.arange(SUBSAMPLES) + 0.5) / SUBSAMPLES - 0.5)
+    assert len(index) > 2000
+    inside, steps = np.zeros(len(index)), 0.9 * ((np.arange(SUBSAMPLES) + 0.5) / SUBSAMPLES - 0.5)
     for offset in np.stack(np.meshgrid(steps, steps, steps, indexing="ij"), axis=-1).reshape(-1, 3):
         distance = tree.distance(grid.to_mm(index) + offset)
-        inside += np.clip(0.5 - distance / (1.2 / SUBSAMPLES), 0.0, 1.0) / SUBSAMPLES**3
+        inside += np.clip(0.5 - distance / (0.9 / SUBSAMPLES), 0.0, 1.0) / SUBSAMPLES**3
     np.testing.assert_allclose(share[tuple(index.T)], inside, rtol=0.0, atol=2e-7)
 
 

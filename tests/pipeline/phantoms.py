@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from scipy import ndimage
 from scipy.interpolate import CubicSpline
@@ -60,7 +62,17 @@ def inside_curve(points, amplitude, seed, wave=10.0):
 
 
 def distance_to(curve, shape, voxel, origin, reach):
-    """Distance of every voxel centre to a dense curve, mm, up to ``reach`` (inf beyond); the ends are cut square."""
+    """Distance of every voxel centre to a dense curve, mm, up to ``reach`` (inf beyond); the ends are cut square.
+
+    Nobody writes into it: it is kept for the next scan of the same tube.
+    """
+    curve = np.ascontiguousarray(curve, float)
+    return _distance_to(curve.tobytes(), tuple(shape), voxel, tuple(origin), reach)
+
+
+@lru_cache(maxsize=4)
+def _distance_to(curve, shape, voxel, origin, reach):
+    curve = np.frombuffer(curve).reshape(-1, 3)
     grid = np.stack(np.meshgrid(*[np.arange(n) for n in shape], indexing="ij"), axis=-1).reshape(-1, 3)
     coarse = cKDTree(curve[:: max(1, len(curve) // 400)])
     points = grid * voxel + origin
@@ -71,6 +83,7 @@ def distance_to(curve, shape, voxel, origin, reach):
     behind = np.sum((points[near] - curve[0]) * (curve[1] - curve[0]), axis=1) < 0
     d[(ahead & (k == len(curve) - 1)) | (behind & (k == 0))] = np.inf
     out[near] = d
+    out.flags.writeable = False
     return out.reshape(shape)
 
 

@@ -229,10 +229,10 @@ def test_a_sweep_reads_the_lumen_of_a_case_once(study: Path, tmp_path: Path, mon
     both, out, read = two_cases(study, tmp_path / "study"), tmp_path / "out", []
     monkeypatch.setattr(cache, "decoded", lambda *args: read.append(args[0]) or decoded(*args))
     wall_of.cache_clear()
-    assert run(both, out, "--sweep", "simulate.wall_scale=0.5", "--sweep", "simulate.friction=0.3", *UNTIL) == 0
+    assert run(both, out, "--sweep", "simulate.wall_scale=0.5,2", "--sweep", "simulate.friction=0.3", *UNTIL) == 0
     assert read.count("segment") == 1
     assert wall_of.cache_info().misses <= 2, "of the lumen as it was segmented, and as it was read"
-    assert run(both, out, "--sweep", "simulate.wall_scale=3", "--resume", *UNTIL) == 0
+    assert run(both, out, "--sweep", "simulate.wall_scale=0.25,3", "--resume", *UNTIL) == 0
     assert read.count("segment") == 2, "another run reads it anew"
 
 

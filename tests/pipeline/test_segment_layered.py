@@ -28,13 +28,13 @@ def phantom(greys, thick_mm, noise=25.0, seed=1):
 
 
 @pytest.mark.parametrize(
-    ("greys", "thick_mm", "noise"),
+    ("greys", "thick_mm"),
     [
-        ((300.0, 100.0, -1000.0), 1.0, 25.0), ((400.0, 150.0, -1000.0), 0.6, 60.0),
-        ((1000.0, 150.0, -1000.0), 0.4, 25.0), ((400.0, 150.0, -1000.0), 2.0, 60.0), ((400.0, 200.0, 0.0), 1.0, 25.0),
-        ((400.0, 150.0, 0.0), 0.6, 60.0), pytest.param((400.0, 200.0, 0.0), 1.0, 60.0, marks=pytest.mark.slow),
+        ((300.0, 100.0, -1000.0), 1.0), ((400.0, 150.0, -1000.0), 0.6), ((1000.0, 150.0, -1000.0), 0.4),
+        ((400.0, 150.0, -1000.0), 2.0), ((400.0, 200.0, 0.0), 1.0), ((400.0, 150.0, 0.0), 0.6),
     ],
 )  # fmt: skip
+@pytest.mark.parametrize("noise", [25.0, 60.0])
 def test_the_lumen_ends_where_the_silicone_begins(greys, thick_mm, noise):
     """The wall was 0.24 to 1.9 mm too far out, and nothing said so."""
     scan, curve, _ = phantom(greys, thick_mm, noise)
