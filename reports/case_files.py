@@ -244,7 +244,12 @@ def runs_in(out_dir: Path) -> list[dict[str, Any]]:
 
 def _began(run: Path) -> str:
     """When a run began, ISO 8601; of one that does not say it, later than all: what it says is to be heeded."""
-    return str(read_json(run.with_name(run.name.replace("run", "provenance"))).get("started", "~"))
+    return str(read_json(provenance_of(run)).get("started", "~"))
+
+
+def provenance_of(run: Path) -> Path:
+    """Where the machine and time of a run stand, beside what it says of itself: run.json, run.1-2.json, ..."""
+    return run.with_name(run.name.replace("run", "provenance"))
 
 
 def _folders(out_dir: Path, named: bool) -> list[Path]:

@@ -36,7 +36,7 @@ from pipeline.study.manifest import Case, Manifest
 from pipeline.study.same_scans import continued
 from pipeline.study.settings import to_toml
 from reports.atomic import WriteError, remove_leftovers, write_text, writing
-from reports.case_files import DOUBTS, counted, left_over
+from reports.case_files import DOUBTS, counted, left_over, provenance_of
 from reports.html import render_index
 from reports.records import read_json
 from reports.schema import FAILURES, OVERALL_FILE, SUMMARY, SWEEP, TIMINGS
@@ -158,7 +158,7 @@ def launch(plan: Plan) -> tuple[Totals, Path]:
     try:
         write_json(out / name, info | {"cases": []})
         write_text(out / "config.resolved.toml", to_toml(settings))
-        write_json(out / name.replace("run", "provenance"), this_run())
+        write_json(provenance_of(out / name), this_run())
     except WriteError as error:
         raise UsageError([str(error)]) from error
     remove_leftovers(out)
