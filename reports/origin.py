@@ -3,7 +3,7 @@
 Each case says it of itself: a folder may hold cases that were run at different times.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +35,12 @@ def what_differs(before: Path, after: Path) -> list[dict[str, str]]:
         same.setdefault(change, []).append(case)
     rows += [(f"input of {listed(cases)}: {key}", a, b) for (key, a, b), cases in same.items()]
     return [{"what": name, "before": a, "after": b} for name, a, b in rows if a != b]
+
+
+def of_two_simulators(differs: Sequence[Mapping[str, str]]) -> str:
+    """That one run's wires are the solver's own and the other's another simulator's. differs : of ``what_differs``."""
+    handed = [row for row in differs if ": simulated.files" in row["what"] and ABSENT in (row["before"], row["after"])]
+    return "the wires of one run are the solver's own, those of the other another simulator's" * bool(handed)
 
 
 def told_alike(before: Path, after: Path) -> str:

@@ -86,7 +86,7 @@ def _compared(first: Path, second: Path, tolerance: Mapping[str, float]) -> Any:
     from pipeline.run.overall import damaged, found_cases, golden_cases, ratio
     from reports.case_files import find_cases
     from reports.diff import diff_folders, not_judged
-    from reports.origin import told_alike, what_differs
+    from reports.origin import of_two_simulators, told_alike, what_differs
     from reports.tolerance import RATIO
     from reports.two_runs import Judged, Verdict, newly_void, newly_warned, warned_of
 
@@ -111,7 +111,7 @@ def _compared(first: Path, second: Path, tolerance: Mapping[str, float]) -> Any:
     unpaired = "over all frames nothing is judged: no frame has points in both runs" * (paired is None)
     said = paired.verdict(allowed, otherwise) if paired else ""
     pooled = _pooled(with_another(first, before), with_another(second, after))
-    caveat = "; ".join(filter(None, (otherwise, unpaired, not_judged(tolerance))))
+    caveat = "; ".join(filter(None, (otherwise, of_two_simulators(differs), unpaired, not_judged(tolerance))))
     warned = warned_of(first), warned_of(second)
     told = told_alike(first, second), newly_warned(*warned), newly_void(*warned)
     return Verdict((first, second), differs, pooled, said, judged, frames, caveat, *told)

@@ -1,15 +1,18 @@
 """Settings of how curves are compared."""
 
 from dataclasses import dataclass
+from typing import Annotated
 
-from pipeline.ranges import Millimetres, Step
+from pydantic import Field
+
+from pipeline.ranges import Millimetres, Number
 
 
 @dataclass(frozen=True)
 class CompareConfig:
     """How curves are compared."""
 
-    sample_mm: Step = 0.5
+    sample_mm: Annotated[float, Field(ge=0.01, le=5, allow_inf_nan=False), Number] = 0.5
     """Arc-length step at which both curves are sampled, so that segment lengths cannot flatter."""
     skip_mm: Millimetres = 10.0
     """Length of wire behind the entry that no score counts, since the clamp was fitted there."""

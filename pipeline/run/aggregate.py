@@ -14,14 +14,15 @@ import pandas as pd
 
 from pipeline.run.another import copies, with_another
 from pipeline.run.exchanged import exchanged
-from pipeline.run.overall import found_cases, frames_of, overall, shared_scans, strangers, validation
+from pipeline.run.kin import told_of_kin
+from pipeline.run.overall import Found, found_cases, frames_of, overall, shared_scans, strangers, validation
 from pipeline.run.results import Result, write_json
 from reports import tables
 from reports.case_files import DOUBTS, GOOD, doubted, not_reached
 from reports.junit import Outcome, write_junit
 from reports.origin import why_not_pooled
 from reports.schema import FAILURES, OVERALL_FILE, SUMMARY, TIMINGS
-from reports.verdict import unscored
+from reports.verdict import remarks, unscored
 
 
 @dataclass(frozen=True)
@@ -55,12 +56,11 @@ class Totals:
 def aggregate(out: Path, run_info: dict[str, Any] | None = None, name: str = "run.json") -> Totals:
     """Write the tables over all cases found, and ``name`` where ``run_info`` is given."""
     cases, mixed = found_cases(out), why_not_pooled(out)
-    among = [] if mixed else with_another(out, cases)
-    found, whole = [case.result for case in cases], {} if mixed else overall(among)
-    seen = [*copies(scored := validation(among)), *exchanged(out, scored)]
+    found, among = [case.result for case in cases], [] if mixed else with_another(out, cases)
+    whole, (assumed, seen) = overall(among), _seen_among(out, among)
     doubts = _with_those_of_runs(out, seen) if run_info is None else [*run_info.get("doubts", ()), *seen]
     if whole:
-        whole["warnings"] += len(doubts)
+        whole["warnings"] += len(doubts) + len(remarks(whole))
     rows, (times, replayed_s) = [result.summary for result in found], _times(out, found)
     failures = [row for result in found for row in result.failures]
     for file, table, given in (
@@ -73,7 +73,7 @@ def aggregate(out: Path, run_info: dict[str, Any] | None = None, name: str = "ru
         tables.write(out / file, table, known)
     tables.write(out / TIMINGS.file, TIMINGS, times)
     if run_info is not None:
-        assumed = [*run_info.get("assumptions", ()), *shared_scans(found), *strangers(found)]
+        assumed = [*run_info.get("assumptions", ()), *shared_scans(found), *assumed]
         cases_of = {"assumptions": assumed, "doubts": doubts, "cases": [result.case for result in found]}
         write_json(out / name, run_info | cases_of | {"overall": whole})
     pooled = [] if mixed else frames_of(validation(cases))
@@ -91,6 +91,13 @@ def aggregate(out: Path, run_info: dict[str, Any] | None = None, name: str = "ru
         bool(mixed),
         frames_fitted=sum(row.get("frames_fitted") or 0 for row in rows),
     )
+
+
+def _seen_among(out: Path, among: Sequence[Found]) -> tuple[list[str], list[str]]:
+    """What is assumed of the cases, and what is doubtful of them, that none of them tells alone."""
+    scored = validation(among)
+    placed, alike = told_of_kin(out, scored)
+    return [*placed, *strangers([case.result for case in among])], [*copies(scored), *alike, *exchanged(out, scored)]
 
 
 def _with_those_of_runs(out: Path, seen: Sequence[str]) -> list[str]:

@@ -5,40 +5,42 @@ It needs the traces of all cases, so it is computed after them and stands in ove
 
 import math
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from scipy.cluster.hierarchy import DisjointSet
 
 from pipeline.arrays.polyline import at_arc, samples
-from pipeline.compare.config import CompareConfig
 from pipeline.compare.metrics import point_to_curve, scored
 from pipeline.compare.nulls import ANOTHER
 from pipeline.model import Array
-from pipeline.run import ledger
+from pipeline.run.kin import SAME_ENTRY_MM, with_kin
 from pipeline.run.overall import Found, phantoms_of
-from reports.frames_file import read_arrays
-from reports.records import read_json
+from pipeline.run.stages.repeated import ALIKE
+from pipeline.run.traced import Traces, skip_mm_of, traces_of
+from reports.case_files import listed
 
-SAME_ENTRY_MM = 2.0
-"""Traces that begin farther apart count their depths from different places and are not compared."""
+ONE_WIRE = 3.0
+"""Distance between two insertions' traces over their standard deviation, below which their wires lie alike: two scans
+of one wire are traced twice their standard deviation apart (1.4 times along each of two axes)."""
+WRITTEN = "are one scan, written again"
+RESCANNED = "tell no more than one insertion that was scanned again"
 NEAREST_MM = 2.0
 """How far off the nearest depth may be, at the least; else half as far as one of its frames is from the next: a trace
 that is farther off stands in for one that is missing, and what is lost would make the wire look better."""
 STEP_MM = 0.5
-ALIKE = 0.3
-"""Distance between two insertions' traces over their standard deviation, below which they are of one: two wires that
-lie alike are traced 1.4 times their standard deviation apart along each axis."""
 MOST_OTHERS = 24
 """Most traces in a guess, those of the nearest depths: with all of 500 cases in one phantom it would take ten minutes,
 and the root mean square over 24 is known to about a seventh of itself (1 / sqrt(48))."""
-Traces = Mapping[int, tuple[float, Array]]
-"""By frame, the depth in mm and the traced wire (n, 3)."""
 
 
 def with_another(out: Path, found: Sequence[Found]) -> list[Found]:
-    """The cases, with the predictor's error added to the frames' rows where other insertions share the phantom."""
+    """The cases, with the predictor's error added to the frames' rows where other insertions share the phantom.
+
+    Also where nobody says so, but wires lie in one place (``with_kin``).
+    """
+    found = with_kin(out, found)
     shared = of_one_phantom(found)
     own = {case.result.case: cases for cases in shared for case in cases}
     traces = {case.result.case: traces_of(out, case) for cases in shared for case in cases}
@@ -57,10 +59,11 @@ def of_one_phantom(found: Sequence[Found]) -> list[list[Found]]:
 
 
 def copies(found: Sequence[Found]) -> list[str]:
-    """A sentence for each two insertions whose traces lie nearer to each other than traces of two scans can.
+    """A sentence for each two insertions whose traces lie nearer to each other than those of two insertions do.
 
     found : of ``with_another``. A scan that was written again (another format, rounded, with a grey more of noise) is
-    traced alike to a hundredth of a voxel; two scans of one wire are not, as each has noise of its own.
+    traced alike to a hundredth of a voxel; another scan of one wire has noise of its own, and one that was drawn out
+    and pushed in again lies elsewhere.
     """
     pairs: dict[tuple[str, ...], list[tuple[float, float]]] = {}
     for case in found:
@@ -71,32 +74,25 @@ def copies(found: Sequence[Found]) -> list[str]:
             both = tuple(sorted((case.insertion, other)))
             pairs.setdefault(both, []).append((float(np.sqrt(squares / count)), sigma))
     farthest = {both: max(ways) for both, ways in pairs.items()}
+    written = {both: mm for both, (mm, sigma) in farthest.items() if mm < ALIKE * sigma}
+    alike = {both: mm for both, (mm, sigma) in farthest.items() if ALIKE * sigma <= mm < ONE_WIRE * sigma}
+    known_to = min((sigma for _, sigma in farthest.values()), default=math.nan)
     return [
-        f"insertions {one!r} and {other!r} are traced to within {apart:.2g} mm of each other, where traces are known "
-        f"to {sigma:.2g} mm: they are one scan, written again, and count as two; give their cases one group"
-        for (one, other), (apart, sigma) in farthest.items()
-        if apart < ALIKE * sigma
+        f"insertions {listed([*map(repr, names)])} are traced to within {apart:.2g} mm of each other, where traces are "
+        f"known to {known_to:.2g} mm: they {what}, and count as {len(names)}; give their cases one group"
+        for found_alike, what in ((written, WRITTEN), (alike, RESCANNED))
+        for names, apart in _together(found_alike)
     ]
 
 
-def skip_mm_of(out: Path, case: Found) -> float:
-    """``compare.skip_mm`` of a run, which is the same for all cases that are pooled."""
-    config = read_json(out / "cases" / case.result.case / ledger.RESULT).get("config", {})
-    return float(config.get("compare", {}).get("skip_mm", {}).get("value", CompareConfig().skip_mm))
-
-
-def arrays_of(out: Path, case: Found, name: str) -> dict[int, Array]:
-    """Curves of a case by frame, those of at least two points."""
-    kept: Mapping[int, Mapping[str, Array]] = {}
-    with suppress(OSError, KeyError, ValueError):  # a finished case whose ledger does not fit it counts as damaged
-        kept = read_arrays(out / "cases" / case.result.case / ledger.FRAMES, name)
-    return {number: arrays[name] for number, arrays in kept.items() if len(arrays.get(name, ())) > 1}
-
-
-def traces_of(out: Path, case: Found) -> Traces:
-    """The traces of a case that are to be trusted, whatever became of the simulated wire."""
-    curves = arrays_of(out, case, "traced_mm")
-    return {number: (depth, curves[number]) for number, depth in case.traced_mm.items() if number in curves}
+def _together(apart: Mapping[tuple[str, ...], float]) -> list[tuple[list[str], float]]:
+    """Insertions that pairs join, be it through others, and how far those of a pair are apart at the most."""
+    sets: DisjointSet[str] = DisjointSet()
+    for one, other in apart:
+        sets.add(one)
+        sets.add(other)
+        sets.merge(one, other)
+    return [(sorted(names), max(mm for both, mm in apart.items() if both[0] in names)) for names in sets.subsets()]
 
 
 def _with_another(case: Found, shared: Sequence[Found], traces: Mapping[str, Traces], skip_mm: float) -> Found:

@@ -13,6 +13,7 @@ from pipeline.calibrate.estimates import Calibration, calibrated
 from pipeline.calibrate.residuals import Evidence
 from pipeline.calibrate.trials import Trial, depths_at
 from pipeline.calibrate.unknowns import Unknown, unknowns
+from pipeline.model import Array
 from pipeline.run.cache import Store
 from pipeline.run.calibrated import data_of
 from pipeline.run.inputs import Inputs
@@ -20,6 +21,7 @@ from pipeline.run.log import Log
 from pipeline.run.stages import Context, run_stages
 from pipeline.run.stages.given import trial_of
 from pipeline.run.stages.load import each_frame
+from pipeline.run.stages.repeated import kept
 from pipeline.status import InputError
 from pipeline.study.manifest import Case
 from pipeline.study.settings import Config
@@ -40,15 +42,16 @@ class CalibrationError(InputError):
 class Gathered:
     """Calibration cases and their insertions.
 
-    stated_mm : the depth that the manifest states for each fitted frame, NaN where none.     voxels : by which each
-    case's scans are known again.     left_out : cases that
-    cannot be used, and why.     notes : assumptions and warnings of all cases.
+    stated_mm : the depth that the manifest states for each fitted frame, NaN where none.     voxels, traced_mm : by
+    which each case's scans are known again, and points (n, 3) on their traces, by which those are known that were
+    written again.     left_out : cases that cannot be used, and why.     notes : assumptions and warnings of all cases.
     """
 
     cases: tuple[Case, ...]
     trials: tuple[Trial, ...]
     stated_mm: tuple[np.ndarray[Any, np.dtype[np.float64]], ...]
     voxels: tuple[tuple[str, ...], ...]
+    traced_mm: tuple[tuple[Array, ...], ...]
     left_out: tuple[str, ...]
     notes: tuple[str, ...]
 
@@ -79,7 +82,7 @@ def gathered(cases: Sequence[Case], config: Config, store: Store, say: Say) -> G
 
     CalibrationError where none is left.
     """
-    kept, trials, stated, voxels, left_out, notes = [], [], [], [], [], []
+    used, trials, stated, voxels, traced, left_out, notes = [], [], [], [], [], [], []
     for case in cases:
         log = Log(lambda *_: None)
         run = Context(case, config, store, log, until="trace", inputs=Inputs.of(case))
@@ -93,15 +96,17 @@ def gathered(cases: Sequence[Case], config: Config, store: Store, say: Say) -> G
             left_out.append(f"{case.id}: left out: {why}; at least {LEAST_FRAMES} are needed")
             continue
         say(f"{case.id}: {len(frames)} of {len(known.frames)} frames are fitted")
-        kept.append(case)
+        used.append(case)
         trials.append(trial_of(run, known, known.frames, roll_free=case.roll_deg == "fit"))
         stated.append(np.array([frame.expected_mm for frame in frames]))
         voxels.append(tuple(frame.voxels for frame in known.frames if frame.voxels))
+        traced.append(tuple(kept(curve) for frame in frames if (curve := frame.trusted_curve) is not None))
     if not trials:
         for note in notes:
             say(note)
         raise CalibrationError(left_out)
-    return Gathered(tuple(kept), tuple(trials), tuple(stated), tuple(voxels), tuple(left_out), tuple(notes))
+    known_by = tuple(voxels), tuple(traced)
+    return Gathered(tuple(used), tuple(trials), tuple(stated), *known_by, tuple(left_out), tuple(notes))
 
 
 def all_unknowns(cases: Sequence[Case]) -> tuple[Unknown, ...]:

@@ -74,8 +74,9 @@ def write_parameters(path: Path, found: Gathered, fit: Calibration) -> Parameter
         lines.append(f"stiffness_N_mm2 = {_text(stated * wall_factor(stated, values))}")
     for row in rows:
         lines += ["", "[[estimate]]", *(f"{key} = {_text(value)}" for key, value in row.items())]
-    for used in used_by(found):
+    for used, traces in zip(used_by(found), found.traced_mm, strict=True):
         lines += ["", "[[used]]", *(f"{key} = {_text(value)}" for key, value in used.items())]
+        lines += ["traced_mm = [", *(f"  {_text(points.round(4).tolist())}," for points in traces), "]"]
     write_text(path, "\n".join(lines) + "\n")
     return read_parameters(path)
 

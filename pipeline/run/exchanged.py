@@ -13,8 +13,9 @@ import numpy as np
 from pipeline.arrays.polyline import at_arc, samples
 from pipeline.compare.metrics import point_to_curve, scored
 from pipeline.model import Array, arc_length
-from pipeline.run.another import STEP_MM, Others, arrays_of, of_one_phantom, skip_mm_of, traces_of
+from pipeline.run.another import STEP_MM, Others, of_one_phantom
 from pipeline.run.overall import Found
+from pipeline.run.traced import arrays_of, skip_mm_of, traces_of
 
 LOOKED_AT, FEWEST, NEARER, IN_ALL = 6, 3, 0.7, 0.5
 """Frames, spread over a case, that are looked at; how many of them, all but one, must be nearer to the other insertion;

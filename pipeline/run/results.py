@@ -43,6 +43,8 @@ LOST = {
 }
 """Statuses of a case that has no result of its own, each with its sentence."""
 
+STATED = "stated: "
+"""How the name of a phantom begins that the manifest states."""
 COMPLETE = (ledger.RESULT, ledger.FILE)
 """Either file says that a run of the case has ended; a ledger without a result: result.json was removed since."""
 
@@ -162,7 +164,7 @@ def names_of(case: Case, known: Known) -> tuple[str, ...]:
     Nothing of the latter where the vessel was segmented from a scan with the wire in it.
     """
     seen = "" if case.reference is None or known.lumen is None else known.lumen.of_scan
-    return (*[f"stated: {case.phantom}"] * bool(case.phantom), *[seen] * bool(seen))
+    return (*[f"{STATED}{case.phantom}"] * bool(case.phantom), *[seen] * bool(seen))
 
 
 def result_of(case: Case, known: Known, summary: dict[str, Any], key: str, details: dict[str, Any]) -> Result:

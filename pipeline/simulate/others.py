@@ -8,7 +8,7 @@ from itertools import pairwise, product
 
 import numpy as np
 
-from pipeline.arrays.polyline import angle_deg, at_arc, other_units, unit_of
+from pipeline.arrays.polyline import angle_deg, at_arc, other_units, samples, unit_of
 from pipeline.model import Array, arc_length
 
 AT_ENTRY_MM = 5.0
@@ -19,6 +19,9 @@ LARGEST_TURN_DEG = 60.0
 OVER_MM = 2.0
 STEP_BACK_MM, BACK = 0.05, -0.5
 """A step longer than this (mm) whose cosine to the one before is below this: no wire turns by 120 degrees there."""
+TIGHTEST_RADII, QUARTER_DEG = 5.0, 90.0
+"""Radius, in the wire's own, of a bend that strains its surface by a fifth; nitinol breaks at about a tenth. A quarter
+of a turn is what it may make on the way of one such quarter, beyond the wire's own curve."""
 ROUNDING_MM = 1e-3
 SAME = 0.15
 """How near log(depth / length) must be to the logarithm of a unit's factor for that unit to be suggested."""
@@ -117,6 +120,27 @@ def _readings(points_mm: Array, unit: str) -> Iterator[tuple[str, Array]]:
 def _far_from(depth_mm: float, length_mm: float) -> bool:
     """Whether a wire of this length is none of this depth; never where the depth is not known."""
     return bool(max(length_mm, 1e-9) > 3.0 * depth_mm or 3.0 * length_mm < depth_mm)
+
+
+def quarter_mm(radius_mm: float) -> float:
+    """Way, mm, on which a wire of this radius makes a quarter of a turn in the tightest bend that it stands."""
+    return 0.5 * float(np.pi) * TIGHTEST_RADII * radius_mm
+
+
+def tightest_bend(points_mm: Array, radius_mm: float, rest_per_mm: float = 0.0) -> tuple[float, Array] | None:
+    """The angle, degrees, by which a wire turns where no wire of this radius does, and the place (3,); None elsewhere.
+
+    rest_per_mm : the largest curvature that the wire was shaped with.
+    """
+    reach = quarter_mm(radius_mm)
+    arc = samples(float(arc_length(points_mm)[-1]), 0.25 * reach)
+    step = np.diff(at_arc(points_mm, arc), axis=0)
+    along = step / np.maximum(np.linalg.norm(step, axis=1), 1e-12)[:, None]
+    turn = np.degrees(np.arccos(np.clip(np.sum(along[:-5] * along[5:], axis=1), -1.0, 1.0)))
+    if not len(turn) or turn.max() <= QUARTER_DEG + np.degrees(rest_per_mm * reach):
+        return None
+    worst = int(np.argmax(turn))
+    return float(turn[worst]), at_arc(points_mm, arc[worst + 3 : worst + 4])[0]
 
 
 def not_to_depth(length_mm: float, depth_mm: float, tolerance_mm: float, stated: str = "mm") -> str:

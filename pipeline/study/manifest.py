@@ -91,6 +91,7 @@ class Case(Strict):
     as_stated: Annotated[str, *FILLED_IN] = ""
     own_parameters: Annotated[str, *FILLED_IN] = ""
     calibrated_scans: Annotated[tuple[str, ...], *FILLED_IN] = ()
+    calibrated_traces: Annotated[tuple[tuple[Point, ...], ...], *FILLED_IN] = ()
     roll_deg: Finite | PerFrame | Literal["fit"] = 0.0
     roll_sigma_deg: NonNegative | None = None
     push_force_N: PerFrame | None = None

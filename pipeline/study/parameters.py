@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from pipeline.load.geometry import LoadError
 from pipeline.load.guard import read_toml, status_of
-from pipeline.ranges import Finite, FiniteProfile, NonNegative, Positive, PositiveProfile
+from pipeline.ranges import Finite, FiniteProfile, NonNegative, Point, Positive, PositiveProfile
 from pipeline.status import InputError
 from pipeline.wording import said, sentences
 
@@ -61,11 +61,16 @@ class Stated(Table):
 
 
 class Used(Table):
-    """A case that was calibrated with. data : hashes of each of its frames and traces, and of its frames' voxels."""
+    """A case that was calibrated with.
+
+    data : hashes of each of its frames and traces, and of its frames' voxels.     traced_mm : points (n, 3) on its
+    frames' traces, by which a scan is known that was written again.
+    """
 
     case: str
     group: str
     data: tuple[str, ...]
+    traced_mm: tuple[tuple[Point, ...], ...] = ()
 
 
 class Parameters(Table):
@@ -134,6 +139,7 @@ def with_parameters(case: "Case", found: Parameters, data: Sequence[str], *, sco
         "wall": replace(case.wall, stiffness_N_mm2=stiffness or case.wall.stiffness_N_mm2, friction=friction),
         "calibrated": _told(case, found, known_wall=stiffness is not None),
         "calibrated_scans": () if score_used else tuple(scan for used in found.used for scan in used.data),
+        "calibrated_traces": () if score_used else tuple(trace for used in found.used for trace in used.traced_mm),
     }
     if case.roll_deg != "fit":
         rolls = case.roll_deg if isinstance(case.roll_deg, tuple) else (case.roll_deg,)
@@ -144,7 +150,7 @@ def with_parameters(case: "Case", found: Parameters, data: Sequence[str], *, sco
     own = sharing(found, data)
     if own:
         warning = f"its scans or traces were calibrated with (as case {own!r}): its errors say nothing about the model"
-        changes |= {"role": "calibration", "own_parameters": warning, "calibrated_scans": ()}
+        changes |= {"role": "calibration", "own_parameters": warning, "calibrated_scans": (), "calibrated_traces": ()}
     return case.model_copy(update=changes)
 
 

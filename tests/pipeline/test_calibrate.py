@@ -330,7 +330,7 @@ def test_scans_that_were_calibrated_with_are_looked_for_unless_they_are_to_be_sc
     (judged,), _ = as_calibrated([case for case in cases if case.id == "b"], study / "p.toml")
     assert judged.calibrated_scans == read_parameters(study / "p.toml").used[0].data
     scored, _ = as_calibrated(cases, study / "p.toml", own=True)
-    assert not any(case.calibrated_scans for case in scored)
+    assert not any(case.calibrated_scans or case.calibrated_traces for case in scored)
 
 
 def test_one_frame_in_common_is_enough(study):
@@ -372,6 +372,8 @@ def test_the_verb_writes_what_it_reads(study, capsys):
     assert main(["calibrate", str(study / "manifest.toml"), "-o", str(study / "out"), "--no-cache"]) == 0
     found = read_parameters(study / "out" / "parameters.toml")
     assert [used.case for used in found.used] == ["a"]
+    ends = [trace[-1] for trace in found.used[0].traced_mm]
+    assert [round(end[2]) for end in ends] == [8, 9, 10], "a scan that is written again is known by its trace"
     assert {"taper", "roll_offset_deg"} <= set(found.unseen)
     said = capsys.readouterr().out
     assert "not seen in these traces, stays as stated; the fit alone gave" in said

@@ -282,6 +282,23 @@ def test_a_wire_that_lies_nearer_to_traces_than_these_are_known_is_no_news(
     assert all("made from the traces" in text for text in warnings)
 
 
+def test_one_frame_that_was_made_from_its_trace_is_enough() -> None:
+    """Four of five were pooled with an honest one, and nothing was said."""
+    curve, off_mm = Curve(np.zeros((5, 3)), np.full(5, 0.05)), [0.001, 0.06, 0.001, 0.002, 0.0]
+    errors = [cast(Any, SimpleNamespace(error_mm=np.full(5, mm))) for mm in off_mm]
+    (said,) = _too_near([Frame(n, curve=curve, comparison=error) for n, error in enumerate(errors)])
+    assert said.startswith("in 4 frames (0, 2, 3, 4) the simulated wires lie within 0.002 mm (rms) of the traced ones")
+
+
+def test_tips_that_lie_beside_the_true_ones_in_half_of_the_frames_are_told() -> None:
+    """Of scans with a voxel spacing 8 % too large three tips in five lay two voxels off."""
+    curve = Curve(np.array([[0.0, 0, 0], [0, 0, 1]]), np.full(2, 0.05), tip_sigma_mm=0.1)
+    truth = [{"trace_mean_mm": 0.05, "trace_tip_mm": mm} for mm in (0.1, 1.2, 1.3, 0.2)]
+    (said,) = _truth_elsewhere([Frame(n, curve=curve, truth=t) for n, t in enumerate(truth)], 0.5)
+    assert "(frame 1: 1.2 mm, frame 2: 1.3 mm)" in said
+    assert not _truth_elsewhere([Frame(n, curve=curve, truth=t) for n, t in enumerate(truth[:2] + truth[:1])], 0.5)
+
+
 @pytest.mark.parametrize(
     ("off_mm", "tip_mm", "said"),
     [(0.05, 0.1, ""), (17.0, 48.0, "lie 17 mm from"), (0.7, 0.7, "lie 0.7 mm from"), (0.1, 4.5, "frame 2: 4.5 mm")],

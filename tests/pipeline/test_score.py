@@ -16,16 +16,18 @@ import pandas as pd
 import pytest
 from numpy.typing import NDArray
 
+from pipeline.arrays.polyline import resample
 from pipeline.cli import main
 from pipeline.commands.score import said_once
 from pipeline.load.geometry import LoadError, Source
 from pipeline.load.vtk import read_vtk_points
 from pipeline.load.wires import numbered_frames, read_wires
 from pipeline.model import arc_length
-from pipeline.simulate.others import begun, not_to_depth, numbered_otherwise, oddity, out_of_order
+from pipeline.simulate.others import begun, not_to_depth, numbered_otherwise, oddity, out_of_order, tightest_bend
 from pipeline.status import InputError
 from pipeline.study.others import named
 from reports.export import write_markups_curve, write_polyline_vtp
+from reports.verdict import remarks
 from tests.pipeline.known_study import FRAMES, PEERS, QUICK, Known, errors_of, peers, run_known, simulated, write_csv
 
 Array = NDArray[np.float64]
@@ -262,6 +264,45 @@ def test_a_score_of_swapped_wires_says_so(known: Known, tmp_path: Path) -> None:
     _, _, result = run_with(known, f'"{folder}/*.csv"', "swapped")
     (said,) = [text for text in map(str, cast(list[object], result["warnings"])) if "order" in text]
     assert "is each file that of its frame?" in said
+
+
+def folded(wire: Array, back_mm: float, apart_mm: float) -> Array:
+    """The wire, its end folded back beside itself in a half circle."""
+    last = int(np.searchsorted(arc_length(wire), arc_length(wire)[-1] - back_mm))
+    along = wire[last] - wire[last - 1]
+    along /= np.linalg.norm(along)
+    across = np.cross(along, [0.0, 1.0, 0.0])
+    across /= np.linalg.norm(across)
+    angle = np.linspace(0.0, np.pi, 8)[1:, None]
+    half = wire[last] + 0.5 * apart_mm * ((1.0 - np.cos(angle)) * across + np.sin(angle) * along)
+    rest = back_mm - 0.5 * np.pi * apart_mm
+    return np.concatenate([wire[: last + 1], half, half[-1] - np.arange(0.25, rest, 0.25)[:, None] * along])
+
+
+def test_a_folded_wire_passes_no_gate_of_warnings(known: Known, tmp_path: Path) -> None:
+    """Its tip 6 mm off, it had an rms of 0.27 mm: what was printed as a warning was not counted as one."""
+    assert tightest_bend(made(), 0.18) is None
+    sharp = tightest_bend(folded(made(), 8.0, 1.2), 0.18)
+    assert sharp is not None
+    assert sharp[0] > 120.0
+    wires = [*known[1][:2], *(folded(resample(wire, 0.25), 6.0, 1.2) for wire in known[1][2:])]
+    folder = write_csv(tmp_path / "folded", wires)
+    _, table, result = run_with(known, f'"{folder}/*.csv"', "folded")
+    assert list(table["status"]) == ["ok"] * FRAMES
+    said = [*map(str, cast(list[object], result["warnings"]))]
+    assert said[-1].startswith("2 frames: wires turn as none of radius_mm = 0.18 does: in frame ")
+    overall = pd.read_csv(known[0].parent / "folded" / "overall.csv").iloc[0]
+    assert remarks(overall), "the tips lie off"
+    assert overall["warnings"] == len(said) + len(remarks(overall))
+
+
+def test_another_simulators_wire_that_lies_in_itself_has_failed(known: Known, tmp_path: Path) -> None:
+    """As the solver's own."""
+    wires = [*known[1][:3], folded(resample(known[1][3], 0.25), 8.0, 0.3)]
+    code, table, result = run_with(known, f'"{write_csv(tmp_path / "hairpin", wires)}/*.csv"', "hairpin")
+    assert code == 1
+    assert list(table["status"]) == [*["ok"] * 3, "self_contact"]
+    assert "wire_003.csv: the wire lies 0.0" in str(result["failures"])
 
 
 def test_a_wire_begins_at_the_clamps_plane() -> None:

@@ -21,7 +21,7 @@ from pipeline.run.stages.rivals import rival_ways, rival_wires, simulated_rivals
 from pipeline.run.stages.views import compare_in_views
 from pipeline.simulate.clamp import ahead_of
 from pipeline.status import FrameStatus
-from reports.case_files import MADE_FROM_TRACES, listed
+from reports.case_files import MADE_FROM_TRACES, counted, listed
 from solver import Solution
 
 
@@ -113,14 +113,15 @@ def _all_compared(
 
 
 NEAREST = 0.2
-"""Share of the traces' standard deviation below which no wire lies near them that does not know them."""
+"""Share of a trace's standard deviation below which no wire lies near it that does not know it: the nearest of the
+solver's own, in 82 frames of the catalogue and a bend, lies 0.59 of it off."""
 
 
 NEAREST_MM = 0.01
 """The same where the curves are the user's own, of unknown standard deviation: no scan shows a wire so well."""
-TRUTH_VOXELS, TRUTH_TIP_VOXELS = 0.5, 3.0
-"""Distance of traced wires from the true ones, median of the frames' means, and of the tips in any frame, voxels, from
-which they are not the same wires: traces lie within 0.1 voxel of the true wire, tips within one."""
+TRUTH_VOXELS, TRUTH_TIP_VOXELS, TRUTH_TIPS_VOXELS = 0.3, 3.0, 1.5
+"""Distance of traced wires from the true ones, median of the frames' means, of the tips in any frame, and in half of
+them, voxels, from which they are not the same wires: traces lie within 0.1 voxel of the true wire, tips within one."""
 TIP_SIGMAS = 5.0
 """The same for tips in their own standard deviations."""
 
@@ -129,12 +130,9 @@ def _truth_elsewhere(frames: Sequence[Frame], voxel_mm: float) -> list[str]:
     """A warning where the true wires of a synthetic study lie elsewhere than the traced ones."""
     known = [f for f in frames if f.trusted_curve is not None and "trace_mean_mm" in f.truth]
     off = float(np.median([f.truth["trace_mean_mm"] for f in known] or 0.0))
-    least = TRUTH_TIP_VOXELS * voxel_mm
-    tips = {
-        f.index: mm
-        for f in known
-        if f.curve is not None and (mm := f.truth["trace_tip_mm"]) > max(least, TIP_SIGMAS * f.curve.tip_sigma_mm)
-    }
+    tips = _tips_elsewhere(known, TRUTH_TIP_VOXELS * voxel_mm)
+    if not tips and 2 * len(often := _tips_elsewhere(known, TRUTH_TIPS_VOXELS * voxel_mm)) >= len(known):
+        tips = often
     said = []
     if off > TRUTH_VOXELS * voxel_mm:
         said.append(f"the true wires lie {off:.2g} mm from the traced ones (median of the frames)")
@@ -145,6 +143,12 @@ def _truth_elsewhere(frames: Sequence[Frame], voxel_mm: float) -> list[str]:
         f"{text}: is truth in mm, in LPS, and of these frames? the columns of the truth say nothing before that"
         for text in said
     ]
+
+
+def _tips_elsewhere(frames: Sequence[Frame], least_mm: float) -> dict[int, float]:
+    """By frame, how far the traced tip lies from the true one, mm, where that is more than it is known to."""
+    off = {f.index: (f.truth["trace_tip_mm"], f.curve.tip_sigma_mm) for f in frames if f.curve is not None}
+    return {index: mm for index, (mm, sigma) in off.items() if mm > max(least_mm, TIP_SIGMAS * sigma)}
 
 
 def _rough_truth(known: Known) -> list[str]:
@@ -161,18 +165,18 @@ def _voxel_mm(known: Known) -> float:
 
 
 def _too_near(frames: Sequence[Frame]) -> list[str]:
-    """A warning where wires lie nearer to the traces than these can be known."""
-    compared = [(f.comparison, f.curve) for f in frames if f.ok and f.comparison is not None and f.curve is not None]
-    if not compared:
+    """A warning where wires lie nearer to the traces than these can be known, be it in some of the frames alone."""
+    seen = [(f.index, f.comparison, f.curve) for f in frames if f.ok and f.comparison and f.curve]
+    each = {n: (rms(comparison.error_mm), float(np.median(curve.sigma_mm))) for n, comparison, curve in seen}
+    near = {n: (mm, s) for n, (mm, s) in each.items() if mm < (NEAREST * s if np.isfinite(s) else NEAREST_MM)}
+    if not near:
         return []
-    off = rms(np.concatenate([comparison.error_mm for comparison, _ in compared]))
-    sigma = float(np.median(np.concatenate([curve.sigma_mm for _, curve in compared])))
+    off, sigma = np.max(list(near.values()), axis=0)
+    some = f"in {counted(len(near), 'frame')} ({listed([*map(str, near)], MOST_NAMED)}) " * (len(near) < len(each))
     known_to = f"which are known to {sigma:.2g} mm: " if np.isfinite(sigma) else ""
-    if not off < (NEAREST * sigma if np.isfinite(sigma) else NEAREST_MM):
-        return []
     return [
-        f"the simulated wires lie {off:.2g} mm (rms) from the traced ones, {known_to}{MADE_FROM_TRACES}, or "
-        "traces from the wires, are so near; their errors say nothing about a simulator"
+        f"{some}the simulated wires lie within {off:.2g} mm (rms) of the traced ones, {known_to}{MADE_FROM_TRACES}, "
+        "or traces from the wires, are so near; their errors say nothing about a simulator"
     ]
 
 

@@ -8,13 +8,24 @@ import numpy as np
 
 from pipeline.arrays.polyline import resample
 from pipeline.load.wires import OtherFile, read_wires
-from pipeline.model import Array, OtherWire, arc_length
+from pipeline.model import Array, OtherWire, Wire, arc_length
 from pipeline.run.stages.known import Context, Frame, Known
 from pipeline.run.stages.own_curves import rough
 from pipeline.simulate import wall_of
-from pipeline.simulate.others import MIRROR, begun, not_to_depth, numbered_otherwise, oddity, out_of_order
+from pipeline.simulate.others import (
+    MIRROR,
+    begun,
+    not_to_depth,
+    numbered_otherwise,
+    oddity,
+    out_of_order,
+    quarter_mm,
+    tightest_bend,
+)
+from pipeline.simulate.resolution import MOST_OVERLAP_RADII
 from pipeline.status import FrameStatus
 from reports.case_files import counted
+from solver.self_contact import self_overlap_mm
 
 STEP_MM = 0.25
 MOST_OUTSIDE = 0.2
@@ -37,6 +48,7 @@ def frames_of_others(run: Context, known: Known) -> tuple[Frame, ...]:
     log.warnings += _in_another_order(frames)
     log.warnings += _outside(known, wires, case.wire.radius_mm)
     log.warnings += rough(wires, voxel_mm, "the simulated wires", "give a point every millimetre")
+    log.warnings += _kinked(wires, case.wire)
     return tuple(frames)
 
 
@@ -76,9 +88,29 @@ def _taken(run: Context, known: Known, frame: Frame, file: OtherFile) -> Frame:
     points = begun(file.points_mm, clamp.entry_mm, clamp.direction)
     deepest = float(_clearance(known, points).max()) + case.wire.radius_mm
     found = replace(frame, simulated=OtherWire(points, max(deepest, 0.0)))
+    overlap = self_overlap_mm(points, case.wire.radius_mm)
+    if overlap > MOST_OVERLAP_RADII * case.wire.radius_mm:
+        what = f"{file.name}: the wire lies {overlap:.2f} mm deep in itself"
+        return found.failed("simulate", FrameStatus.SELF_CONTACT, what)
     length = float(arc_length(points)[-1])
     wrong = not_to_depth(length, frame.depth_mm, run.config.trace.length_tolerance_mm, file.unit)
     return found.failed("simulate", FrameStatus.NOT_TO_DEPTH, f"{file.name}: {wrong}") if wrong else found
+
+
+def _kinked(wires: Mapping[int, Array], wire: Wire) -> list[str]:
+    """A warning where wires (n, 3), by frame, turn as no wire of this radius does."""
+    rest = float(np.abs(np.atleast_2d(wire.rest_curvature_per_mm)[:, -1]).max())
+    bends = {n: tightest_bend(points, wire.radius_mm, rest) for n, points in wires.items()}
+    found = {n: bend for n, bend in bends.items() if bend is not None}
+    if not found:
+        return []
+    worst = max(found, key=lambda n: found[n][0])
+    angle, place = found[worst]
+    reach, where = quarter_mm(wire.radius_mm), ", ".join(f"{x:.1f}" for x in place)
+    return [
+        f"{counted(len(found), 'frame')}: wires turn as none of radius_mm = {wire.radius_mm:g} does: in frame {worst} "
+        f"by {angle:.0f} degrees within {reach:.1f} mm, near [{where}] mm; is the wire folded there?"
+    ]
 
 
 def _clearance(known: Known, points: Array) -> Array:

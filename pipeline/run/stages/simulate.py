@@ -16,13 +16,11 @@ from pipeline.run.stages.others import frames_of_others
 from pipeline.run.stages.roll import with_fitted_roll
 from pipeline.simulate import LEVELS, altered, insertion_of, simulate, wall_of
 from pipeline.simulate.clamp import depth_from
-from pipeline.simulate.resolution import LARGEST_JOINT_TURN_DEG, Resolved, lengths_mm, resolve
+from pipeline.simulate.resolution import LARGEST_JOINT_TURN_DEG, MOST_OVERLAP_RADII, Resolved, lengths_mm, resolve
 from pipeline.status import FrameStatus, StageError
 from reports.case_files import counted
 from solver import Snap, Solution
 
-MOST_OVERLAP_RADII = 0.1
-"""Overlap of the wire with itself, in radii, that still counts as a touch: less than a scan can show."""
 NEARLY_MM = 1.0
 """How much deeper than the traced wire a catheter may be stated without a warning."""
 

@@ -43,12 +43,13 @@ def trace_frames(run: Context, known: Known) -> Known:
         if not given:
             return known
         own = [as_given(run, *pair, known.lumen.distance) for pair in zip(known.frames, given, strict=True)]
-        return _with_room(run, known, _in_step(run, own, voxel_mm))
+        return _with_room(run, known, _in_step(run, once(own, run.case.calibrated_scans), voxel_mm))
     work = _Tracing(run, known, given)
     parts = run.share("trace", work.part, len(known.frames), work.meanwhile)
     for part in parts:
         run.log.add(part.log)
-    frames, assumed = own_dim_ends(once([p.frame for p in parts], run.case.calibrated_scans), voxel_mm)
+    single = once([p.frame for p in parts], run.case.calibrated_scans, run.case.calibrated_traces)
+    frames, assumed = own_dim_ends(single, voxel_mm)
     run.log.assumptions += assumed
     frames, doubtful_gaps = own_gaps(frames, voxel_mm)
     run.log.warnings += doubtful_gaps
