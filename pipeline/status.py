@@ -13,8 +13,8 @@ class FrameStatus(Enum):
     ROLL_FITTED = "the roll of the insertion was fitted on this frame, so that it is not scored"
     LOAD_FAILED = "the scan could not be read; the message names the file and the reason"
     REPEATED = (
-        "the scan is that of an earlier frame, or one that was calibrated with, and a scan counts once; take one of the "
-        "two out of the case"
+        "the scan is that of an earlier frame, or one that was calibrated with, and a scan counts once; take one of "
+        "the two out of the case"
     )
     SEGMENT_FAILED = "no lumen could be segmented; the message has the reason"
     NO_WIRE = "no wire was found in this frame; check that the scan shows one and that entry_mm lies on it"

@@ -136,12 +136,24 @@ def test_lengths_out_of_step_are_noticed_without_scans(tmp_path: Path) -> None:
     text = MANIFEST.replace("insertion_mm = [8.54, 18.41, 28.76, 38.5]", f"insertion_mm = {[*depths, *depths]}")
     manifest.write_text(text, encoding="utf-8")
     short = to_length(WIRES[2], arc_length(WIRES[2])[-1] - 1.5)  # within the tolerance of 2 mm that every length has
-    again = [wire + 1e-4 for wire in (WIRES[0], WIRES[1], short, WIRES[3])]  # no copies, which are refused
+    again = [wire + 0.02 for wire in (WIRES[0], WIRES[1], short, WIRES[3])]  # no copies, which count once
     write_csv(tmp_path / "traces", [*WIRES, *again])
     main(["run", str(manifest), "-o", str(tmp_path / "out"), "--until", "trace", *QUICK])
     failures = pd.read_csv(tmp_path / "out" / "failures.csv")
     assert "as in the frames around it" in failures["message"].item()
     assert failures[["frame", "status"]].to_numpy().tolist() == [[6, "length_mismatch"]]
+
+
+def test_a_curve_that_is_written_again_counts_once(tmp_path: Path) -> None:
+    """Sampled anew it is another file: frames that it fills were counted twice."""
+    manifest = write_study(tmp_path)
+    text = MANIFEST.replace("[8.54, 18.41, 28.76, 38.5]", "[8.54, 18.41, 28.76, 38.5, 38.5]")
+    manifest.write_text(text, encoding="utf-8")
+    write_csv(tmp_path / "traces", [*WIRES, resample(WIRES[-1], 0.4)])
+    main(["run", str(manifest), "-o", str(tmp_path / "out"), "--until", "trace", *QUICK])
+    failures = pd.read_csv(tmp_path / "out" / "failures.csv")
+    assert failures[["frame", "status"]].to_numpy().tolist() == [[4, "repeated"]]
+    assert failures["message"].item().startswith("it ends where frame 3 does, to 0.01 mm")
 
 
 def test_a_curve_is_known_by_its_end_in_whatever_file() -> None:

@@ -13,6 +13,7 @@ from pipeline.arrays.polyline import resample
 from pipeline.load.curves import read_curve
 from pipeline.model import Array, Curve, arc_length
 from pipeline.run.stages.known import Context, Frame
+from pipeline.run.stages.repeated import TIP
 from pipeline.segment.opened import may_lie_outside_mm, outside_mm
 from pipeline.simulate.others import begun, oddity
 from pipeline.status import FrameStatus
@@ -66,7 +67,7 @@ def known_by_tip(points_mm: Array) -> str:
     """
     if arc_length(points_mm)[-1] - np.linalg.norm(points_mm[-1] - points_mm[0]) < LEAST_BEND_MM:
         return ""
-    return "tip " + " ".join(f"{x:.2f}" for x in np.round(points_mm[-1], 2) + 0.0)
+    return TIP + " ".join(f"{x:.2f}" for x in np.round(points_mm[-1], 2) + 0.0)
 
 
 def _smooth(curve: Curve) -> Curve:

@@ -23,6 +23,8 @@ are traced twice the standard deviation apart (1.4 times along each of two axes)
 grey more or less 0.02 to 0.3 times."""
 STEP_MM = 2.0
 """Between the points that are kept of a trace."""
+TIP = "tip "
+"""How ``Frame.voxels`` of the user's own curve begins."""
 OF_CALIBRATION = "a scan that was calibrated with"
 
 
@@ -34,10 +36,9 @@ def once(frames: Sequence[Frame], calibrated: Collection[str] = (), traced_mm: S
     out, first = list(frames), dict[str, int]()
     for n, frame in enumerate(frames):
         same = first.setdefault(frame.voxels, n)
-        if frame.voxels in calibrated:
-            out[n] = _repeated(frame, f"it has the voxels of {OF_CALIBRATION}: it says nothing about the model")
-        elif frame.voxels and same != n:
-            out[n] = _repeated(frame, f"it has the voxels of frame {same}")
+        whose = OF_CALIBRATION if frame.voxels in calibrated else f"frame {same}" if frame.voxels and same != n else ""
+        if whose:
+            out[n] = _repeated(frame, _the_same(frame.voxels, whose))
     earlier = [(OF_CALIBRATION, np.asarray(points, dtype=np.float64)) for points in traced_mm]
     for n, frame in enumerate(out):
         if (curve := frame.trusted_curve) is not None:
@@ -49,6 +50,11 @@ def once(frames: Sequence[Frame], calibrated: Collection[str] = (), traced_mm: S
 def kept(curve: Curve) -> Array:
     """Points (n, 3) on a trace by which its scan is known again, its tip the last."""
     return at_arc(curve.points_mm, samples(curve.length_mm, STEP_MM))
+
+
+def _the_same(voxels: str, whose: str) -> str:
+    """In words, what two frames have in common that are known by the same."""
+    return f"it ends where {whose} does, to 0.01 mm" if voxels.startswith(TIP) else f"it has the voxels of {whose}"
 
 
 def _alike(curve: Curve, earlier: Sequence[tuple[str, Array]]) -> str:
