@@ -1,5 +1,6 @@
 """The folder of one case, read: result.json, errors.csv, points.csv.gz, frames.h5. Any of them may be missing."""
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -122,20 +123,29 @@ def results_in(out_dir: Path) -> dict[str, dict[str, Any]]:
 
 DOUBTS = "doubts.json"
 """What ``wireval report`` found doubtful among all cases of a folder: shards have not seen each other's."""
+_NUMBER = re.compile(r"[0-9]+(?:\.[0-9]+)?(?:e-?[0-9]+)?")
 MADE_FROM_TRACES = "only wires that were made from the traces"
 """What a warning of wires that lie nearer to the traces than these are known says; their errors are none."""
 
 
 def said_by_cases(results: Mapping[str, Mapping[str, Any]], key: str) -> list[str]:
-    """What the cases of a run say under ``warnings`` or ``assumptions``, each text once, with the cases that say it.
+    """What the cases of a run say under ``warnings`` or ``assumptions``, a line each, with the cases that say it.
 
-    results : result.json by case.
+    What differs in its numbers alone is one line, that of the first case. results : result.json by case.
     """
-    found: dict[str, list[str]] = {}
+    if len(results) == 1:
+        return [str(text) for result in results.values() for text in result.get(key, ())]
+    said: dict[str, dict[str, list[str]]] = {}
     for case, result in results.items():
-        for text in result.get(key, ()):
-            found.setdefault(str(text), []).append(case)
-    return [text if len(results) == 1 else f"{listed(cases)}: {text}" for text, cases in found.items()]
+        for text in map(str, result.get(key, ())):
+            said.setdefault(_NUMBER.sub("#", text), {}).setdefault(text, []).append(case)
+    lines = []
+    for texts in said.values():
+        cases = dict.fromkeys(case for named in texts.values() for case in named)
+        others = len(texts) - 1
+        more = f" ({others} more with other numbers, on the pages of the cases)" * (others > 0)
+        lines.append(f"{listed([*cases])}: {next(iter(texts))}{more}")
+    return lines
 
 
 def find_cases(out_dir: Path) -> list[Path]:

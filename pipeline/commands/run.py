@@ -66,6 +66,7 @@ def main(args: argparse.Namespace) -> int:
 def _run(args: argparse.Namespace, gates: "Sequence[Gate]") -> int:
     from pipeline.run.aggregate import write_tests
     from pipeline.run.batch import require_cluster
+    from pipeline.run.gate import held
     from pipeline.run.last_words import last_line
     from pipeline.run.launch import intention, launch
     from pipeline.run.results import found_results
@@ -85,10 +86,10 @@ def _run(args: argparse.Namespace, gates: "Sequence[Gate]") -> int:
         return 0
     require_cluster(plan.address)  # before OUT is claimed
     totals, index = launch(plan)
-    held = {one.asked: one.closed(totals.pooled) for one in gates}
-    closed = [why for why in held.values() if why]
+    judged = held(gates, plan.out, totals.pooled)
+    closed = [why for why in judged.values() if why]
     if args.junit:
-        write_tests(args.junit, found_results(plan.out), held)
+        write_tests(args.junit, found_results(plan.out), judged)
     _tell(plan, totals, closed)
     say(last_line(totals, index))
     return 0 if totals.all_ok and not closed else 1

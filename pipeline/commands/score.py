@@ -12,7 +12,6 @@ from pipeline.commands.given import add_calibrated, file_of
 
 if TYPE_CHECKING:
     from pipeline.run.aggregate import Totals
-    from pipeline.run.gate import Gate
     from pipeline.run.launch import Plan
 
 HELP = "judge other simulators' wires by the same pipeline, side by side with the solver's own"
@@ -45,7 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(args: argparse.Namespace) -> int:
     """Exit 0 all ok, 1 some case of any simulator failed or a gate closed; InputError where the input is wrong."""
-    from pipeline.run.gate import gate
+    from pipeline.run.gate import gate, held
     from pipeline.run.simulators import side_by_side
     from pipeline.status import InputError
     from pipeline.study.check import check
@@ -71,7 +70,8 @@ def main(args: argparse.Namespace) -> int:
     sys.stderr.writelines(f"{line}\n" for line in warnings if args.quiet)
     for line in side_by_side(args.out, {name: plan.out for name, plan in plans.items()}, args.embed):
         say(line)
-    closed = [f"{n}: {why}" for n in totals if n != OURS for why in _closed(gates, plans[n], totals[n])]
+    judged = {name: held(gates, plans[name].out, totals[name].pooled) for name in totals if name != OURS}
+    closed = [f"{name}: {why}" for name, whys in judged.items() for why in whys.values() if why]
     sys.stderr.writelines(f"{line}\n" for line in closed)
     return 0 if all(one.all_ok for one in totals.values()) and not closed else 1
 
@@ -95,15 +95,6 @@ def _judged(plans: "Mapping[str, Plan]", quiet: bool) -> "dict[str, Totals]":
         for text in remarks(totals.pooled, name):
             say(f"{name}: warning: {text}")
     return done
-
-
-def _closed(gates: "Sequence[Gate]", plan: "Plan", totals: "Totals") -> list[str]:
-    """Why a simulator must not pass, gate by gate. Errors of wires made from the traces are none."""
-    from reports.case_files import copied_from_traces, warnings_in
-
-    copied = copied_from_traces(warnings_in(plan.out)) if gates else ""
-    told = (f"gate closed: {gate.asked}: {copied}" if copied else gate.closed(totals.pooled) for gate in gates)
-    return [why for why in told if why]
 
 
 def said_once(said: Mapping[str, Sequence[str]]) -> list[str]:

@@ -3,8 +3,9 @@
 import math
 import operator
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from pipeline.status import UsageError, did_you_mean
@@ -40,6 +41,17 @@ class Gate:
             return f"gate closed: {self.asked}: {OVERALL_FILE} has no {self.column}{why}; it cannot be shown to hold"
         passed = not RELATIONS[self.relation](value, self.limit)
         return "" if passed else f"gate closed: {self.asked}: {self.column} is {value:.4g}"
+
+
+def held(gates: Iterable[Gate], out: Path, overall: Mapping[str, Any]) -> dict[str, str]:
+    """By what was asked, why a run must not pass, empty where it may.
+
+    Errors of wires that were made from the traces open no gate. overall : the row of the run into ``out``.
+    """
+    from reports.case_files import copied_from_traces, warnings_in  # half a second, for a gate that may be refused
+
+    copied = copied_from_traces(warnings_in(out))
+    return {g.asked: f"gate closed: {g.asked}: {copied}" if copied else g.closed(overall) for g in gates}
 
 
 def gate(text: str) -> Gate:

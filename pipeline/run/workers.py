@@ -10,12 +10,14 @@ import multiprocessing
 import os
 import resource
 import signal
+import sys
 import time
 from collections import deque
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from multiprocessing import connection, forkserver, resource_tracker
 from pathlib import Path
+from types import ModuleType
 from typing import Any, Generic, NamedTuple, TypeVar
 
 from pipeline import THREADS, one_thread
@@ -64,7 +66,8 @@ class Worker(Generic[J, R]):
         context = multiprocessing.get_context("forkserver")
         self.pipe, theirs = context.Pipe()
         self.process = context.Process(target=_serve, args=(theirs, work))
-        self.process.start()
+        with _without_main():
+            self.process.start()
         theirs.close()
         self._job: list[J] = []
         self._since, self._peak_mib = 0.0, 0.0
@@ -150,6 +153,20 @@ def _start_server() -> None:
             os.environ.pop(name)
             if value is not None:
                 os.environ[name] = value
+
+
+@contextmanager
+def _without_main() -> Iterator[None]:
+    """Hide the caller's script from a process that is started: it would run that anew, and so call what called it.
+
+    A worker needs nothing that is defined there; multiprocessing asks every script for a guard instead.
+    """
+    main = sys.modules["__main__"]
+    sys.modules["__main__"] = ModuleType("__main__")
+    try:
+        yield
+    finally:
+        sys.modules["__main__"] = main
 
 
 @contextmanager

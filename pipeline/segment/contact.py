@@ -61,7 +61,7 @@ def counted(places: Sequence[object]) -> str:
 def named(places: Sequence[Contact]) -> str:
     """The largest places in words, each with its area."""
     largest = sorted(places, key=lambda c: -c.area_mm2)[:MOST_NAMED]
-    return ", ".join(f"{[float(round(x, 1)) for x in c.place_mm]} ({c.area_mm2:.1f} mm²)" for c in largest)
+    return ", ".join(f"{[float(round(x, 1)) for x in c.place_mm]} mm ({c.area_mm2:.1f} mm²)" for c in largest)
 
 
 def warning(places: tuple[Contact, ...]) -> tuple[str, ...]:
@@ -70,7 +70,7 @@ def warning(places: tuple[Contact, ...]) -> tuple[str, ...]:
         return ()
     return (
         f"segment: vessels that run side by side are open to each other in {counted(places)}, allowed 0; largest "
-        f"at {named(places)} mm; a simulated wire may slip across there: look at the picture, scan with smaller voxels,"
+        f"at {named(places)}; a simulated wire may slip across there: look at the picture, scan with smaller voxels,"
         " or give the lumen as a file (manifest key lumen)",
     )
 

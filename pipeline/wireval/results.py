@@ -10,13 +10,15 @@ from typing import Any, NoReturn
 import numpy as np
 import pandas as pd
 
-from pipeline.run.gate import gate
+from pipeline.run.gate import gate, held
 from pipeline.run.results import Result, found_results
 from pipeline.status import InputError, did_you_mean
 from reports import tables
 from reports.case_files import CaseFiles, amiss, find_cases, listed, not_run, read_case
 from reports.origin import why_not_pooled
-from reports.schema import ERRORS, FAILURES, OVERALL_FILE, POINTS, SUMMARY, SWEEP, Table
+from reports.schema import ERRORS, FAILURES, OVERALL_FILE, POINTS, SIMULATORS, SUMMARY, SWEEP, WHERE, Table
+from reports.simulators import folders_in
+from reports.verdict import OURS
 
 _SHOWN = ["case", "status", "frames", "frames_ok", "rms_mm", "tip_median_mm", "skill_strongest", "strongest_null"]
 
@@ -35,9 +37,11 @@ class Results:
 
     summary : a row a case.     overall : one row over all validation cases, with intervals.     errors : a row a frame,
     of all cases.     failures : what is not ok, and why.     sweep : a row for each value of a sweep.
+    simulators, where : of a score, how good each one is, and which is nearest where.
     cases : each case's folder, read: ``results.cases["run1"].read_frame(3).simulated_mm``.     closed : a sentence for
-    each ``fail_if`` of the run that holds.     damaged : cases whose files are not as they were written; their errors
-    and points are left out.     other_tables : a sentence where summary.csv is not of the cases beside it.
+    each ``fail_if`` of the run that holds, of a score for every simulator.     damaged : cases whose files are not as
+    they were written; their errors and points are left out.     other_tables : a sentence where summary.csv is not of
+    the cases beside it.
     """
 
     out: Path
@@ -46,6 +50,8 @@ class Results:
     errors: pd.DataFrame
     failures: pd.DataFrame
     sweep: pd.DataFrame
+    simulators: pd.DataFrame
+    where: pd.DataFrame
     cases: Cases
     closed: tuple[str, ...] = ()
     damaged: tuple[str, ...] = ()
@@ -143,10 +149,17 @@ def read_run(out: Path, gates: Sequence[str] = ()) -> Results:
 
 
 def with_gates(found: Results, gates: Sequence[str]) -> Results:
-    """The results with a sentence for each ``fail_if`` that holds."""
-    known = found.overall.head(1).dropna(axis=1).to_dict("records")
-    pooled = {str(name): value for row in known for name, value in row.items()}
-    return replace(found, closed=tuple(filter(None, (gate(text).closed(pooled) for text in gates))))
+    """The results with a sentence for each ``fail_if`` that holds: of a score, of every simulator but the solver."""
+    others = {name: folder for name, folder in folders_in(found.out).items() if name != OURS}
+    judged = {f"{name}: ": held(map(gate, gates), folder, _pooled(folder)) for name, folder in others.items()}
+    judged = judged or {"": held(map(gate, gates), found.out, _pooled(found.out))}
+    return replace(found, closed=tuple(f"{whose}{why}" for whose, own in judged.items() for why in own.values() if why))
+
+
+def _pooled(out: Path) -> dict[str, Any]:
+    """The row of overall.csv, without what is missing there."""
+    known = tables.read_if_there(out / OVERALL_FILE, SUMMARY).head(1).dropna(axis=1).to_dict("records")
+    return {str(name): value for row in known for name, value in row.items()}
 
 
 def _results(out: Path, cases: dict[str, CaseFiles], damaged: tuple[str, ...] = ()) -> Results:
@@ -158,7 +171,8 @@ def _results(out: Path, cases: dict[str, CaseFiles], damaged: tuple[str, ...] = 
         warnings.warn(f"{out}: the run into it has not ended, tables over all cases are empty; {again}", stacklevel=3)
     whole = table(SUMMARY, OVERALL_FILE)
     errors = _of_all({name: case.errors for name, case in cases.items() if name not in damaged}, ERRORS)
-    return Results(out, table(SUMMARY), whole, errors, table(FAILURES), table(SWEEP), Cases(cases), damaged=damaged)
+    beside = table(FAILURES), table(SWEEP), table(SIMULATORS), table(WHERE)
+    return Results(out, table(SUMMARY), whole, errors, *beside, Cases(cases), damaged=damaged)
 
 
 def _of_all(by_case: dict[str, pd.DataFrame], kind: Table) -> pd.DataFrame:

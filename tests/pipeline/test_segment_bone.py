@@ -38,7 +38,7 @@ def lump(x, size, level):
 def test_what_touches_the_wall_is_flagged_with_its_place(x, size, level):
     said = flags([lump(x, size, level)])
     assert len(said) == 1
-    place = np.array(json.loads(said[0].split("largest at ")[1].split(" (")[0]))
+    place = np.array(json.loads(said[0].split("largest at ")[1].split(" mm (")[0]))
     assert abs(place[2] - 15.0) < 1.5
     assert 0.5 < place[0] < 3.5
 

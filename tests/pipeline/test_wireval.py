@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -10,6 +12,7 @@ import pytest
 import wireval
 from pipeline.cli import main
 from pipeline.run.sweep import PLAIN
+from tests.pipeline.known_study import run_known, write_csv
 
 
 @pytest.fixture(scope="module")
@@ -111,3 +114,34 @@ def test_what_cannot_be_used_is_raised(study: Path, tmp_path: Path) -> None:
         wireval.calibrate(study, tmp_path / "calibrated")
     with pytest.raises(wireval.InputError, match="cannot be written"):
         wireval.run(study, study / "manifest.toml" / "out")
+
+
+def test_a_plain_script_may_use_several_processes(study: Path, tmp_path: Path) -> None:
+    """Each worker ran the script anew, which has no guard, as none of ours in the docs has: 452 lines of tracebacks."""
+    text = (study / "manifest.toml").read_text(encoding="utf-8")
+    head, case = text.split("[[case]]")
+    two = "".join(f"[[case]]{case.replace('straight', name)}" for name in ("one", "two"))
+    (study / "two.toml").write_text(head + two, encoding="utf-8")
+    script = tmp_path / "plain.py"
+    call = f"wireval.run({str(study / 'two.toml')!r}, {str(tmp_path / 'out')!r}, jobs=2, until='trace', quiet=True)"
+    script.write_text(f"import wireval\nprint('begun')\nprint(list({call}.summary['status']))\n", encoding="utf-8")
+    done = subprocess.run([sys.executable, script], capture_output=True, text=True, check=False)
+    assert done.stderr.count("Traceback") == 0, done.stderr
+    assert done.stdout.count("begun") == 1
+    assert "'worker_lost'" not in done.stdout
+
+
+def test_a_gate_that_any_simulator_closes_is_told(tmp_path: Path) -> None:
+    """It was told of the first alone: a script went on where the command line had exit code 1."""
+    manifest, wires = run_known(tmp_path)
+    for name, off_mm in (("near", 0.05), ("far", 0.7)):
+        write_csv(tmp_path / name, [wire + [0.0, off_mm, 0.0] for wire in wires])
+    curves = {name: tmp_path / name for name in ("near", "far")}
+    scored = wireval.score(
+        manifest, tmp_path / "scored", curves, fail_if="rms_mm>0.6", settings={"compare.simulated_nulls": False}
+    )
+    assert not scored.ok
+    (why,) = scored.closed
+    assert why.startswith("far: gate closed: --fail-if rms_mm>0.6: rms_mm is 0.")
+    assert set(scored.simulators["simulator"]) == {"near", "far", "wireval"}
+    assert len(scored.where)

@@ -10,7 +10,7 @@ import pytest
 
 from reports import _content
 from reports.calibration import gained
-from reports.case_files import counted
+from reports.case_files import counted, said_by_cases
 from reports.counts import scans
 from reports.schema import SWEEP
 
@@ -144,3 +144,15 @@ def test_a_calibration_that_gains_nothing_says_so() -> None:
     assert gained([row | {"after_mm": 0.3} for row in frames]).endswith("0.300 mm as calibrated: farther away")
     assert gained([row | {"after_mm": 0.02} for row in frames]).endswith("0.0200 mm as calibrated")
     assert gained([]) == gained([{"depth_mm": 10.0, "before_mm": None, "after_mm": 0.1}]) == ""
+
+
+def test_what_cases_say_with_other_numbers_is_one_line() -> None:
+    """Of 20 warnings of a study 16 were that a wire gave way, and five were shown: two of them one bone's."""
+    snaps = [{"warnings": [f"frame {n}: gave way at {n}.5 mm", "bone touches"]} for n in range(3)]
+    results = dict(zip("abc", snaps, strict=True))
+    assert said_by_cases(results, "warnings") == [
+        "a, b, c: frame 0: gave way at 0.5 mm (2 more with other numbers, on the pages of the cases)",
+        "a, b, c: bone touches",
+    ]
+    alone = {"a": {"warnings": ["frame 1: gave way", "frame 2: gave way"]}}
+    assert said_by_cases(alone, "warnings") == ["frame 1: gave way", "frame 2: gave way"], "its page has them all"

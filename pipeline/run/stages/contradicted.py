@@ -21,6 +21,7 @@ FAR_NEARER = 0.7
 square. Of a wire turned by 60 degrees or more, the right roll is that."""
 FEWEST = 3
 """Frames from which that says something: of one, which any small cause may bend, half the distance is no news."""
+ENDS = "whether the traces end where the wire does, which a stated insertion_mm tells (a faint tip is not seen)"
 FRAME_NEARER, LEAST_MM = 0.4, 0.3
 """The same for a frame alone, whose wire may have let go, and the least rms distance that is worth a word there."""
 
@@ -105,9 +106,9 @@ def _said(where: str, other_mm: float, stated_mm: float, way: SimulatedVariant) 
     how, do = {
         BENT: (
             f"with {way.bent:g} times its tip's curve",
-            "rest_curvature_per_mm (per mm) and, where that is right, roll_deg and the wall's friction",
+            f"rest_curvature_per_mm (per mm) and, where that is right, roll_deg, the wall's friction and {ENDS}",
         ),
-        TIP_CURVE: ("straight at rest", "rest_curvature_per_mm and roll_deg"),
+        TIP_CURVE: ("straight at rest", f"rest_curvature_per_mm, roll_deg and {ENDS}"),
         ROLL: (
             f"turned by {(way.turn_deg + 179.0) % 360.0 - 179.0:+g} degrees",
             "roll_deg (degrees), material_axis, the tip's sign, the axes (LPS or RAS) and, with friction, "
