@@ -40,6 +40,7 @@ OURS = "wireval"
 """Name of this package's own wire among simulators."""
 WORSE = "worse than a guess"
 NO_BETTER, NOT_SHOWN = "no better than a guess", "not shown to be better than a guess"
+TOO_FEW = "too few insertions to tell"
 TIPS_OFF, COPIED = "the tips lie off", "made from the traces"
 NEVER_NEAREST = TIPS_OFF, COPIED
 """Why a simulator leads nowhere, whatever its distances to the traced wire."""
@@ -109,6 +110,8 @@ def badge(status: str, good: bool, statistics: Mapping[str, Any]) -> dict[str, s
     statistics : a row of summary.csv or overall.csv, empty where nothing was scored.
     """
     poor = standing(statistics) if good else ""
+    if poor == NOT_SHOWN and _skill(statistics)[1] > 0.0 and _few_insertions(statistics):
+        poor = TOO_FEW  # a wire of skill 0.97 and one of 0.34 had one badge, as if neither were any good
     return {"text": poor or status, "look": "poor" if poor else "good" if good else "bad"}
 
 

@@ -66,7 +66,7 @@ def _fit(args: argparse.Namespace, cases: "tuple[Case, ...]", config: "Config", 
     for one in written.estimate:
         sd = spread_in_words(one.sd, logarithmic=one.logarithmic)
         unseen = f"  not seen in these traces, stays as stated; the fit alone gave {one.value:g}: {one.why}"
-        apart = f"  of {one.value:g}, with what is not seen free as well" * (f"{one.value:g}" != f"{one.used:g}")
+        apart = f"  ({one.value:g} where all parameters are free)" * (f"{one.value:g}" != f"{one.used:g}")
         verdict = apart if one.seen else unseen
         say(f"{one.name:20s} {one.used:10g}  +- {sd:8s}{verdict}")
     if said := gained([vars(frame) for frame in fit.frames]):
