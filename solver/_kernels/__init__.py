@@ -14,7 +14,7 @@ handle           what these work on, behind one pointer shaft            the wir
 septum           whether the wire left its lumen        snaps            energy that a step released
 saddle           the way off a saddle                   trial            a share of the step, and the energy there
 records          what the kernels note                  forks            whether there is a rest shape on another side
-sleeve           the catheter over the wire
+sleeve           the catheter over the wire             free_body        the work on the wire beyond a node
 
 lanes            several wires side by side, in the processor's vectors, by the same formulas
 bare             arrays without reference counts

@@ -14,6 +14,7 @@ from solver._kernels.data import CONVERGED, CURRENT, LAST_GOOD, ROUGH, Problem
 from solver._kernels.flags import inlined, merged
 from solver._kernels.forces import push_force
 from solver._kernels.forks import farthest
+from solver._kernels.free_body import work_on
 from solver._kernels.friction import friction_loss
 from solver._kernels.minimise import NEWTON
 from solver._kernels.shaft import loss_by_turning
@@ -50,22 +51,25 @@ def account(handle: Any, k: int, reached: tuple[float, float, float], used: int,
     """
     problem, at, report, introducer = handle.problem, handle.place[0], handle.report[0], handle.introducer
     books, pending = balance(handle, k, reached), not math.isnan(at.seen_depth)
+    ahead, newton = beyond_catheter(handle, k, reached[0], books), handle.limits.method == NEWTON
     moved = way_of_joints(problem, at, k, handle.table.segment) if used > tol.SWIFT else 0.0
     leapt = moved > tol.SNAP_WAYS * books.way
-    doubtful = handle.limits.method == NEWTON and doubt(books, used, at.shrink, report.pivot, moved)
+    doubtful = newton and (doubt(books, used, at.shrink, report.pivot, moved) or (leapt and gives_way(ahead)))
+    rough = newton and ahead.way > 0.0 and astray(handle, ahead, used, moved)
     # shorter steps do not make a wire more certain if it is free to turn, and in doubt already
     told = report.pivot < tol.FREE and (at.seen_calm if pending else at.calm) < tol.CALM_MM
-    if doubtful and not told and at.resigned == 0.0 and books.share > (1.0 + 2.0 * tol.OVERSHOOT) * introducer.finest:
+    finer = at.resigned == 0.0 and books.share > (1.0 + 2.0 * tol.OVERSHOOT) * introducer.finest
+    if (doubtful or rough) and finer and not told:
         if not pending:
             remember(problem, at, k, reached)
         return ROUGH
     # a wire that moved no further than its base did not snap: the missing work is an error of the trapezium rule
-    snapped = doubtful and leapt and books.missing > books.large + tol.CHANGE_SHARE * books.share * books.change
+    snapped = doubtful and leapt and (gives_way(books) or gives_way(ahead))
     # a wire that was firm before did not snap, but hopped over a barrier, which still shorter steps may not pass
     if snapped and min(handle.report[1].pivot, report.pivot) > tol.SOFT:
         at.seen_pivot = math.inf
     if snapped or other > 0.0:
-        note_snap(problem, at, (moved, other), (reached[0], books.missing))
+        note_snap(problem, at, (moved, other), (reached[0], max(books.missing, ahead.missing)))
     trust(handle, k, reached, doubtful and (moved > tol.ELSEWHERE_MM or at.resigned > 0.0))
     if other > 0.0:
         at.calm = at.seen_calm = tol.CALM_MM - tol.UNDECIDED_MM
@@ -114,6 +118,42 @@ def balance(handle: Any, k: int, reached: tuple[float, float, float]) -> Books:
     share = max(way / introducer.step, abs(reached[1] - at.roll) / introducer.turn)
     gives = (push - at.push) * ahead < 0.0
     return Books(push, torque, pull, way, share, lost, lost - rubbed, large, change, gives)
+
+
+@merged
+def beyond_catheter(handle: Any, k: int, depth: float, books: Books) -> Books:
+    """The same for the wire beyond the catheter's tip, as a free body; a way of 0 where it is not judged by itself.
+
+    A hop of a soft tip is lost in the books of a stiff pair, whose energy changes with the number of segments as well.
+    Not with friction, whose steps are short, nor where the wire is pulled back.
+    """
+    at, nothing = handle.place[0], Books(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, False)
+    if at.next == 0.0 or at.catheter == 0.0 or handle.problem.friction.coefficient > 0.0:
+        return nothing
+    segment = handle.table.segment
+    back = k - segments_at(at.inserted, segment)[0]
+    # the first joint whose cell was bare before the step, and is
+    cut = math.ceil(k + 0.5 - min(at.inserted - at.catheter, depth - at.next) / segment)
+    if back < 0 or cut < back + 2 or cut > k - 2:
+        return nothing
+    missing, work, change, energy = work_on(handle.problem, cut, k, back)
+    large = tol.WORK_SHARE * work + tol.ENERGY_SHARE * energy
+    push, torque, pull = books.push, books.torque, books.pull
+    return Books(push, torque, pull, books.way, books.share, missing, missing, large, change, books.gives)
+
+
+@merged
+def astray(handle: Any, ahead: Books, used: int, moved: float) -> bool:
+    """Whether shorter steps may lead the wire beyond the catheter elsewhere; no reason to doubt these as well."""
+    strays = used > tol.SWIFT and (moved > tol.FURTHER * ahead.way or handle.problem.scratch.descent[0].forked != 0)
+    strays = strays and abs(ahead.missing) > tol.STRAYS * ahead.large
+    return strays or doubt(ahead, used, handle.place[0].shrink, handle.report[0].pivot, moved)
+
+
+@inlined
+def gives_way(books: Books) -> bool:
+    """Whether more is missing than the trapezium rule explains."""
+    return books.missing > books.large + tol.CHANGE_SHARE * books.share * books.change
 
 
 @inlined

@@ -6,6 +6,7 @@ from typing import Any
 
 from solver._compile import on_disk
 from solver._kernels import blocks, closed_form, energy, forces, forks, newton, rollout, rotation, septum, start
+from solver._kernels import free_body as beyond
 from solver._kernels.flags import FAST
 from solver._kernels.lanes import field as lane_field
 from solver._kernels.lanes.vectors import in_lanes
@@ -90,3 +91,13 @@ def solve_stiffened(q: Any, more: float, twisting: bool) -> Any:
 @entry_point
 def outside_by(field: Any, x: Any, k: int) -> float:
     return forces.furthest_outside(field, x, k)
+
+
+@entry_point
+def free_body(problem: Any, slot: int, cut: int, k: int) -> Any:
+    return beyond.free_body(problem, slot, cut, k, 0)
+
+
+@entry_point
+def work_on(problem: Any, cut: int, k: int, back: int) -> Any:
+    return beyond.work_on(problem, cut, k, back)
