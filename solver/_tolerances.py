@@ -246,8 +246,8 @@ at best. In 6,000 insertions the sides that long and short steps took differed b
 UNDECIDED_MM = 5.0
 """Way, mm, on which a wire that took one of two sides is called uncertain. With 2.5 mm, 4 more of 218,400 depths are
 off without the flag; for as long as both sides lie apart, the flag would cover 5.15 % of them instead of 4.86 %."""
-CALM_MM = 2.5
+DOUBT_LASTS_MM = 2.5
 """Way, mm, after a snap on which a wire may still lie elsewhere than after shorter steps."""
-HELD_CALM = 0.25
+HELD_SHARE = 0.25
 """What a mm of that way counts where friction holds the wire on the side to which it went: two were 5 to 7 mm apart,
 one of them gone by 2.5 mm later, the other still there."""

@@ -59,7 +59,7 @@ class Snap(NamedTuple):
 
 
 _NAMES = PLACE.names or ()
-_OF_PLACE = itemgetter(*map(_NAMES.index, ("energy", "dissipated", "calm", "rubbed", "stored", "snaps")))
+_OF_PLACE = itemgetter(*map(_NAMES.index, ("energy", "dissipated", "since_doubt", "rubbed", "stored", "snaps")))
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +123,7 @@ class Solution:
         first ``PLACE.snaps`` are valid.     ended : status, iterations, depth, mm, roll, degrees, wire's radius, mm.
         """
         place, (start, penetration, push, force, torque, *_, pivot), (bending, wall, *_), counts = notes
-        energy, dissipated, calm, rubbed, stored, snapped = _OF_PLACE(place)
+        energy, dissipated, since_doubt, rubbed, stored, snapped = _OF_PLACE(place)
         reaction = np.array(force)
         for array in (*arrays, reaction):
             array.setflags(write=False)
@@ -150,7 +150,7 @@ class Solution:
             least_pivot=pivot,
             dissipated_N_mm=dissipated,
             snaps=tuple(Snap(*snaps.item(n)) for n in range(snapped)) if snapped else (),
-            uncertain=calm < tol.CALM_MM,
+            uncertain=since_doubt < tol.DOUBT_LASTS_MM,
             radius_mm=ended[4],
         )
         return solution

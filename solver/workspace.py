@@ -96,8 +96,8 @@ class Workspace:
         self.counters, self.place = np.zeros(1, records.COUNTERS), np.zeros(1, records.PLACE)
         # the same memory without names: to clear a record field by field takes 6 µs
         self.counts = self.counters.view(np.int64)
-        self.place["shrink"], self.place["calm"] = 1.0, np.inf
-        self.place["seen_depth"] = np.nan
+        self.place["shrink"], self.place["since_doubt"] = 1.0, np.inf
+        self.place["rough_depth"] = np.nan
         self.snaps, self.held_load = np.zeros(SNAPS_KEPT, records.SNAP), np.zeros(3)
         self.report = np.zeros(3, records.REPORT)
         self._grow(16)

@@ -17,7 +17,7 @@ from reports.figures._planes import PLANES, Plane, View, around, points_table, w
 from reports.figures._style import BROWN, Look
 from reports.frames_file import FrameArrays, ScanCrop
 
-_BAND: Look = {"facecolor": SIMULATED, "alpha": 0.3, "linewidth": 0}
+_BAND: Look = {"facecolor": SIMULATED, "alpha": 0.3, "linewidth": 0, "label": "two standard deviations of its inputs"}
 _RIM: Look = {"path_effects": [withStroke(linewidth=3.2, foreground="white", alpha=0.75)]}
 """A curve of any colour stands out from every grey of a scan."""
 _LOOKS: dict[str, Look] = {
@@ -105,7 +105,7 @@ def _draw(case: CaseFiles, scan: ScanCrop, chosen: Sequence[tuple[int, str]]) ->
         row[0].set_title(f"frame {number} ({title})", loc="left", fontsize=9)
     handles, labels = rows[0][0].get_legend_handles_labels()
     if handles:
-        legend(figure, handles, labels, loc="outside upper left", ncols=3)
+        legend(figure, handles, labels, loc="outside upper left", ncols=4)
     return Drawing(figure, pd.concat([_table(frame) for frame in frames]), scans=True)
 
 

@@ -72,7 +72,7 @@ def step_until(handle: Any, to_depth: float, to_roll: float, laid: int) -> tuple
 def prepare(handle: Any, to_depth: float, to_roll: float) -> float:
     """Get ready for a goal; return how many iterations it may take: a cap on the time of a hopeless scene."""
     at, introducer = handle.place[0], handle.introducer
-    at.rubbed, at.dissipated, at.snaps, at.seen_depth, at.resigned = 0.0, 0.0, 0, math.nan, 0.0
+    at.rubbed, at.dissipated, at.snaps, at.rough_depth, at.refining_failed = 0.0, 0.0, 0, math.nan, 0.0
     if reverses(handle, to_depth - at.inserted, to_roll - at.roll):
         at.shrink = min(at.shrink, tol.REFINE * introducer.finest)
     steps = abs(to_depth - at.inserted) / introducer.step + abs(to_roll - at.roll) / introducer.turn
@@ -118,9 +118,9 @@ def adapt_step(handle: Any, outcome: int, iterations: int, limit: float) -> tupl
         at.shrink = min(1.0, 2 * at.shrink)
     elif outcome == data.ROUGH:
         at.shrink = max(tol.REFINE * at.shrink, handle.introducer.finest)
-    elif helps and at.resigned == 0.0 and not math.isnan(at.seen_depth) and outcome != data.THROUGH_WALL:
+    elif helps and at.refining_failed == 0.0 and not math.isnan(at.rough_depth) and outcome != data.THROUGH_WALL:
         # short steps only check what a long one leads to: where they fail, the long one is all there is
-        at.resigned, at.shrink = 1.0, 1.0
+        at.refining_failed, at.shrink = 1.0, 1.0
     elif helps:
         at.shrink *= 0.5
     return outcome == data.CONVERGED or outcome == data.ROUGH or helps, outcome
@@ -172,7 +172,7 @@ def accept_or_revert(
     if outcome == data.CONVERGED and laid == 0:
         outcome = account(handle, k, (depth, roll, energy), used, other)
     elif outcome == data.CONVERGED and handle.report[0].pivot < tol.CRITICAL:
-        at.calm = 0.0
+        at.since_doubt = 0.0
     if laid > 0 or outcome == data.CONVERGED:
         note_change(problem, data.CURRENT, k)
         at.last_step, at.last_turn = depth - at.inserted, roll - at.roll
@@ -205,9 +205,9 @@ def classify(problem: Problem, margin: float, k: int, laid: int) -> int:
 def next_target(handle: Any, to_depth: float, to_roll: float) -> tuple[float, float]:
     """Depth, mm, and roll, degrees, that the next step leads to; a catheter goes on in proportion."""
     at, goal = handle.place[0], handle.place[0].goal
-    if not math.isnan(at.seen_depth):
+    if not math.isnan(at.rough_depth):
         # to where a rough step led, for the two ways to be compared there
-        to_depth, to_roll, goal = at.seen_depth, at.seen_roll, at.seen_catheter
+        to_depth, to_roll, goal = at.rough_depth, at.rough_roll, at.rough_catheter
     ahead, turn = to_depth - at.inserted, to_roll - at.roll
     longest = longest_step(handle.problem, handle.table, handle.introducer, at.inserted, ahead, turn)
     if goal != at.catheter:

@@ -73,21 +73,23 @@ forked : 1 where it passed an unstable state, see ``forks``.     rung : see ``fo
 Closed form. share : of its own step.     next_check : iteration at which it is judged.     checked_energy : then.
 """
 PLACE = record(
-    *((name, float) for name in ("inserted", "roll", "energy", "shrink", "last_step", "last_turn", "rise", "resigned")),
-    *((name, float) for name in ("seen_depth", "seen_roll", "seen_catheter", "seen_calm", "seen_pivot")),
-    *((name, float) for name in ("push", "torque", "dissipated", "calm", "rubbed")),
+    *((name, float) for name in ("inserted", "roll", "energy", "shrink", "last_step", "last_turn", "rise")),
+    *((name, float) for name in ("refining_failed", "rough_depth", "rough_roll", "rough_catheter")),
+    *((name, float) for name in ("rough_since_doubt", "rough_pivot")),
+    *((name, float) for name in ("push", "torque", "dissipated", "since_doubt", "rubbed")),
     *((name, float) for name in ("catheter", "goal", "next", "pull", "stored")),
     ("snaps", np.int64),
 )
 """Where an insertion is. inserted, roll, energy : mm beyond the entry, degrees, N mm.     shrink : share of the longest
 step that it takes.     last_step, last_turn : its last step, mm and degrees.
 rise : energy of the last start that was not foreseen, above that predicted from the hand's push, N mm; it fades.
-resigned : 1 where short steps to where a rough one led failed: then long ones are taken, whatever they do.
+refining_failed : 1 where short steps to where a rough one led failed: then long ones are taken, whatever they do.
 
 push, torque : the hand's there, N and N mm.     dissipated, rubbed : lost of its work on the way to this depth, in all
-and by friction, N mm.     calm : way since the wire snapped or was about to, mm.     snaps : number on the way.
-seen_depth, seen_roll, seen_catheter : where a rough step led that is being taken again; nan where there is none.
-seen_calm : what calm was before it.     seen_pivot : pivot above which it counts that long and short steps agree.
+and by friction, N mm.     since_doubt : way since the wire snapped or was about to, mm.     snaps : number on the way.
+rough_depth, rough_roll, rough_catheter : where a rough step led that is being taken again; nan where there is none.
+rough_since_doubt : what since_doubt was before it.     rough_pivot : pivot above which it counts that long and short
+steps agree.
 catheter, goal, next : where the catheter's tip is, is to go, and goes in this step, mm beyond the entry.     pull : the
 force of its hand, N.     stored : energy that it keeps in the wire, N mm, a part of ``energy``.
 """

@@ -21,7 +21,7 @@ from solver._kernels.shaft import loss_by_turning
 from solver._kernels.sleeve import tip_force
 
 
-class Books(NamedTuple):
+class WorkBalance(NamedTuple):
     """A step's work and energy.
 
     push, torque, pull : the hand's at its end, see ``records.PLACE``.     way : longest way of a hand, mm.
@@ -50,30 +50,32 @@ def account(handle: Any, k: int, reached: tuple[float, float, float], used: int,
     other : how far off another side lies, mm.
     """
     problem, at, report, introducer = handle.problem, handle.place[0], handle.report[0], handle.introducer
-    books, pending = balance(handle, k, reached), not math.isnan(at.seen_depth)
-    ahead, newton = beyond_catheter(handle, k, reached[0], books), handle.limits.method == NEWTON
+    balance, pending = balance_work(handle, k, reached), not math.isnan(at.rough_depth)
+    ahead, newton = beyond_catheter(handle, k, reached[0], balance), handle.limits.method == NEWTON
     moved = way_of_joints(problem, at, k, handle.table.segment) if used > tol.SWIFT else 0.0
-    leapt = moved > tol.SNAP_WAYS * books.way
-    doubtful = newton and (doubt(books, used, at.shrink, report.pivot, moved) or (leapt and gives_way(ahead)))
+    leapt = moved > tol.SNAP_WAYS * balance.way
+    doubtful = newton and (doubt(balance, used, at.shrink, report.pivot, moved) or (leapt and gives_way(ahead)))
     rough = newton and ahead.way > 0.0 and astray(handle, ahead, used, moved)
     # shorter steps do not make a wire more certain if it is free to turn, and in doubt already
-    told = report.pivot < tol.FREE and (at.seen_calm if pending else at.calm) < tol.CALM_MM
-    finer = at.resigned == 0.0 and books.share > (1.0 + 2.0 * tol.OVERSHOOT) * introducer.finest
-    if (doubtful or rough) and finer and not told:
+    since_doubt = at.rough_since_doubt if pending else at.since_doubt
+    already_uncertain = report.pivot < tol.FREE and since_doubt < tol.DOUBT_LASTS_MM
+    finer = at.refining_failed == 0.0 and balance.share > (1.0 + 2.0 * tol.OVERSHOOT) * introducer.finest
+    if (doubtful or rough) and finer and not already_uncertain:
         if not pending:
             remember(problem, at, k, reached)
         return ROUGH
     # a wire that moved no further than its base did not snap: the missing work is an error of the trapezium rule
-    snapped = doubtful and leapt and (gives_way(books) or gives_way(ahead))
+    snapped = doubtful and leapt and (gives_way(balance) or gives_way(ahead))
     # a wire that was firm before did not snap, but hopped over a barrier, which still shorter steps may not pass
     if snapped and min(handle.report[1].pivot, report.pivot) > tol.SOFT:
-        at.seen_pivot = math.inf
+        at.rough_pivot = math.inf
     if snapped or other > 0.0:
-        note_snap(problem, at, (moved, other), (reached[0], max(books.missing, ahead.missing)))
-    trust(handle, k, reached, doubtful and (moved > tol.ELSEWHERE_MM or at.resigned > 0.0))
+        note_snap(problem, at, (moved, other), (reached[0], max(balance.missing, ahead.missing)))
+    trust(handle, k, reached, doubtful and (moved > tol.ELSEWHERE_MM or at.refining_failed > 0.0))
     if other > 0.0:
-        at.calm = at.seen_calm = tol.CALM_MM - tol.UNDECIDED_MM
-    at.push, at.torque, at.pull, at.dissipated = books.push, books.torque, books.pull, at.dissipated + books.lost
+        at.since_doubt = at.rough_since_doubt = tol.DOUBT_LASTS_MM - tol.UNDECIDED_MM
+    at.push, at.torque, at.pull = balance.push, balance.torque, balance.pull
+    at.dissipated += balance.lost
     return CONVERGED
 
 
@@ -87,14 +89,14 @@ def may_fork(handle: Any, k: int, depth: float, used: int) -> bool:
     problem, at = handle.problem, handle.place[0]
     if problem.scratch.descent[0].forked == 0 or used <= tol.SWIFT:
         return False
-    if handle.report[0].pivot < tol.SOFT and at.calm < tol.CALM_MM:
+    if handle.report[0].pivot < tol.SOFT and at.since_doubt < tol.DOUBT_LASTS_MM:
         return False
     way = max(abs(depth - at.inserted), abs(at.next - at.catheter))
     return bool(way_of_joints(problem, at, k, handle.table.segment) > tol.FURTHER * way)
 
 
 @merged
-def balance(handle: Any, k: int, reached: tuple[float, float, float]) -> Books:
+def balance_work(handle: Any, k: int, reached: tuple[float, float, float]) -> WorkBalance:
     """Work out the hand's work in a step, by the trapezium rule, and what became of it."""
     problem, at, report, introducer = handle.problem, handle.place[0], handle.report[0], handle.introducer
     ahead, turn = reached[0] - at.inserted, math.radians(reached[1] - at.roll)
@@ -117,17 +119,17 @@ def balance(handle: Any, k: int, reached: tuple[float, float, float]) -> Books:
     way = max(abs(ahead), abs(onwards))
     share = max(way / introducer.step, abs(reached[1] - at.roll) / introducer.turn)
     gives = (push - at.push) * ahead < 0.0
-    return Books(push, torque, pull, way, share, lost, lost - rubbed, large, change, gives)
+    return WorkBalance(push, torque, pull, way, share, lost, lost - rubbed, large, change, gives)
 
 
 @merged
-def beyond_catheter(handle: Any, k: int, depth: float, books: Books) -> Books:
+def beyond_catheter(handle: Any, k: int, depth: float, balance: WorkBalance) -> WorkBalance:
     """The same for the wire beyond the catheter's tip, as a free body; a way of 0 where it is not judged by itself.
 
-    A hop of a soft tip is lost in the books of a stiff pair, whose energy changes with the number of segments as well.
+    A hop of a soft tip is lost in the balance of a stiff pair, whose energy changes with the number of segments, too.
     Not with friction, whose steps are short, nor where the wire is pulled back.
     """
-    at, nothing = handle.place[0], Books(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, False)
+    at, nothing = handle.place[0], WorkBalance(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, False)
     if at.next == 0.0 or at.catheter == 0.0 or handle.problem.friction.coefficient > 0.0:
         return nothing
     segment = handle.table.segment
@@ -138,12 +140,12 @@ def beyond_catheter(handle: Any, k: int, depth: float, books: Books) -> Books:
         return nothing
     missing, work, change, energy = work_on(handle.problem, cut, k, back)
     large = tol.WORK_SHARE * work + tol.ENERGY_SHARE * energy
-    push, torque, pull = books.push, books.torque, books.pull
-    return Books(push, torque, pull, books.way, books.share, missing, missing, large, change, books.gives)
+    push, torque, pull = balance.push, balance.torque, balance.pull
+    return WorkBalance(push, torque, pull, balance.way, balance.share, missing, missing, large, change, balance.gives)
 
 
 @merged
-def astray(handle: Any, ahead: Books, used: int, moved: float) -> bool:
+def astray(handle: Any, ahead: WorkBalance, used: int, moved: float) -> bool:
     """Whether shorter steps may lead the wire beyond the catheter elsewhere; no reason to doubt these as well."""
     strays = used > tol.SWIFT and (moved > tol.FURTHER * ahead.way or handle.problem.scratch.descent[0].forked != 0)
     strays = strays and abs(ahead.missing) > tol.STRAYS * ahead.large
@@ -151,42 +153,43 @@ def astray(handle: Any, ahead: Books, used: int, moved: float) -> bool:
 
 
 @inlined
-def gives_way(books: Books) -> bool:
+def gives_way(balance: WorkBalance) -> bool:
     """Whether more is missing than the trapezium rule explains."""
-    return books.missing > books.large + tol.CHANGE_SHARE * books.share * books.change
+    return balance.missing > balance.large + tol.CHANGE_SHARE * balance.share * balance.change
 
 
 @inlined
-def doubt(books: Books, used: int, shrink: float, pivot: float, moved: float) -> bool:
+def doubt(balance: WorkBalance, used: int, shrink: float, pivot: float, moved: float) -> bool:
     """Whether a shorter step may lead elsewhere. used, shrink, pivot : of the step. moved : longest way of a joint."""
-    missing, large = books.missing, books.large
+    missing, large = balance.missing, balance.large
     # a step that the tip's sight alone keeps short is easier than a long one
-    toil = tol.TOIL * max(min(books.share, 1.0), tol.SIGHT_SHARE) if shrink == 1.0 else tol.TOIL
+    toil = tol.TOIL * max(min(balance.share, 1.0), tol.SIGHT_SHARE) if shrink == 1.0 else tol.TOIL
     some = abs(missing) > (tol.FREE_SHARE if pivot < tol.FREE else tol.SOFT_SHARE) * large
-    if (used > toil and (some or pivot < tol.SOFT)) or abs(missing) > tol.STRANGE * large + books.change:
+    if (used > toil and (some or pivot < tol.SOFT)) or abs(missing) > tol.STRANGE * large + balance.change:
         return True
     if pivot < tol.SOFT:
         return used > tol.EASY and some
-    further = used >= tol.EASY and moved > tol.FURTHER * books.way
-    if further and books.gives and abs(missing) > tol.GIVES * books.change:
+    further = used >= tol.EASY and moved > tol.FURTHER * balance.way
+    if further and balance.gives and abs(missing) > tol.GIVES * balance.change:
         return True
-    large += tol.CHANGE_SHARE * books.share * books.change
+    large += tol.CHANGE_SHARE * balance.share * balance.change
     return (used > tol.EASY and missing > large) or (used > tol.SWIFT and missing < -tol.GAINED * large)
 
 
 @merged
 def remember(problem: Problem, at: Any, k: int, reached: tuple[float, float, float]) -> None:
     """Keep the wire that a rough step led to, to compare the one of shorter steps with it."""
-    at.seen_depth, at.seen_roll, at.seen_catheter, at.seen_calm = reached[0], reached[1], at.next, at.calm
+    at.rough_depth, at.rough_roll, at.rough_catheter = reached[0], reached[1], at.next
+    at.rough_since_doubt = at.since_doubt
     # rounding may decide to which side a straight wire turns that touched nothing: both ways may agree by chance
-    at.seen_pivot = tol.LOOSE if at.energy > 0.0 else tol.FREE
+    at.rough_pivot = tol.LOOSE if at.energy > 0.0 else tol.FREE
     for n in range(k + 1):
         store3(problem.scratch.seen, n, load3(problem.state.x[CURRENT], n))
 
 
 @merged
 def trust(handle: Any, k: int, reached: tuple[float, float, float], doubtful: bool) -> None:
-    """Count the way since the wire gave way, or could have: for CALM_MM it may lie elsewhere than after shorter steps.
+    """Count the way since the wire gave way, or could have: for DOUBT_LASTS_MM it may lie elsewhere.
 
     A rough step is forgotten where shorter ones lead to the same wire without a snap, unless the wire is about to give
     way: rounding may have decided before to which side such a wire turns.
@@ -194,17 +197,17 @@ def trust(handle: Any, k: int, reached: tuple[float, float, float], doubtful: bo
     problem, at, report = handle.problem, handle.place[0], handle.report[0]
     ahead = abs(reached[0] - at.inserted)
     if problem.friction.coefficient > 0.0:
-        ahead *= tol.HELD_CALM
-    if report.pivot > tol.STIFF or at.calm >= tol.CALM_MM:
-        at.calm += ahead
+        ahead *= tol.HELD_SHARE
+    if report.pivot > tol.STIFF or at.since_doubt >= tol.DOUBT_LASTS_MM:
+        at.since_doubt += ahead
     if doubtful or report.pivot < tol.CRITICAL:
-        at.calm = min(at.calm, 0.0)
-    left = abs(reached[0] - at.seen_depth) + abs(reached[1] - at.seen_roll) + abs(at.next - at.seen_catheter)
+        at.since_doubt = min(at.since_doubt, 0.0)
+    left = abs(reached[0] - at.rough_depth) + abs(reached[1] - at.rough_roll) + abs(at.next - at.rough_catheter)
     if left < tol.MATCH_DEPTH_MM:
         same = farthest(problem.scratch.seen, 0, problem.state.x[CURRENT], 0, k + 1) < tol.SAME_MM
-        same = same and at.resigned == 0.0 and report.pivot > at.seen_pivot
-        at.calm = at.seen_calm + ahead if same else min(at.calm, 0.0)
-        at.seen_depth, at.resigned = math.nan, 0.0
+        same = same and at.refining_failed == 0.0 and report.pivot > at.rough_pivot
+        at.since_doubt = at.rough_since_doubt + ahead if same else min(at.since_doubt, 0.0)
+        at.rough_depth, at.refining_failed = math.nan, 0.0
 
 
 @merged
