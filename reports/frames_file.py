@@ -4,7 +4,7 @@
     /scan/lumen_mip_A    optional uint8, projection of the lumen's mask along array axis A
     /scan/entry_slab_A   optional uint8, where no lumen was found (the crop is the whole scan then): its maxima near the
                          entry along array axis A
-    /frames/NNN          datasets: the fields of ``FrameArrays`` that are not None
+    /frames/NNN          datasets of a frame, see below
     /frames/NNN/mip_A    optional uint8, maximum-intensity projection along array axis A: (y, z), (x, z), (x, y)
     /frames/NNN/straightened    optional uint8, the scan along the traced wire: planes across it, ``along_mm`` apart,
                          of samples ``across_mm`` apart, the wire in their middle; ``normal``: their first axis

@@ -20,7 +20,7 @@ from pipeline.study.explain import described
 from pipeline.study.manifest import ManifestTables
 from pipeline.wording import WRITTEN_HERE, in_words
 from reports import frames_file, schema
-from reports.frames_file import ATTRIBUTES
+from reports.frames_file import ATTRIBUTES, FrameArrays
 from reports.schema import Table
 from solver import Status
 from tests.studies import metrics_page
@@ -70,7 +70,8 @@ KEYS = {
     "friction of Uncertainty": "Of the coefficient of friction.",
     "projections": "Two-dimensional views instead of frames.",
     "lumen_seed_mm": "Points in the lumen, LPS mm. Default: the entry.",
-    "truth": "True wires of a synthetic study.",
+    "truth": "True wires of a synthetic study, one for each frame, LPS mm, from the entry to the tip: JSON, "
+    '`{"frames": [{"points_mm": [[x, y, z], ...]}, ...]}`.',
     "wall": "The wall's stiffness and friction, below.",
     "down": "Where gravity points; needed by a wire with a weight.",
     "catheter": "An outer tube over the wire, below.",
@@ -265,9 +266,13 @@ def signature(thing: Callable[..., Any]) -> str:
 def frames() -> str:
     rows = [(f"`{name}`", str(value)) for name, value in ATTRIBUTES.items()]
     text = (inspect.getdoc(frames_file) or "").partition("\n\n")[2]
-    return "\n".join(
-        ["# frames.h5\n", NOTE, f"```text\n{text}\n```\n", "Attributes of the file:\n", table(("name", "value"), rows)]
-    )
+    of_a_frame = (inspect.getdoc(FrameArrays) or "").partition("\n\n")[2]
+    parts = [
+        *("# frames.h5\n", NOTE, f"```text\n{text}\n```\n"),
+        f"Datasets of a frame, as far as it has them:\n\n```text\n{of_a_frame}\n```\n",
+        *("Attributes of the file:\n", table(("name", "value"), rows)),
+    ]
+    return "\n".join(parts)
 
 
 PAGES: dict[str, Callable[[], str]] = {
