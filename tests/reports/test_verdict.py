@@ -91,7 +91,7 @@ def test_a_wide_interval_of_few_insertions_is_no_fault_of_the_wire() -> None:
     row = {"skill_strongest": 0.97, "skill_strongest_low": -0.1, "strongest_null": "previous"}
     told = row | {"interval": "wide: 3 insertions"}
     assert badge("ok", True, told) == {"text": "too few insertions to tell", "look": "poor"}
-    assert badge("ok", True, told | {"skill_strongest": -0.1})["text"] == "worse than a guess"
+    assert badge("ok", True, told | {"skill_strongest": -0.1})["text"] == "no better than a guess"
     assert badge("ok", True, row)["text"] == "not shown to be better than a guess"
 
 
