@@ -15,12 +15,13 @@ from pipeline.trace.coarse import coarse_lumen, coarse_scan, times
 from pipeline.trace.config import TraceConfig
 from pipeline.trace.elsewhere import brightest_line
 from pipeline.trace.explain import explained, hardly_begun, missed_mm
+from pipeline.trace.onward import GOES_ON
 from pipeline.trace.stated import Opacity
 from pipeline.trace.subtraction import subtracting
 from pipeline.trace.verdict import near_rotation_plane
 from pipeline.trace.whose_end import BEYOND_GAP, DIM_FROM_TIP, GAP, cleared
 
-__all__ = ["BEYOND_GAP", "DIM_FROM_TIP", "GAP", "cleared", "of_catheter", "of_length", "trace"]
+__all__ = ["BEYOND_GAP", "DIM_FROM_TIP", "GAP", "GOES_ON", "cleared", "of_catheter", "of_length", "trace"]
 
 THICK_VOXELS = 1.6
 """Blur of a wire, from which its crest wanders: the ends of such wires, 0.9 mm in voxels of 0.15 mm, were 2 voxels off

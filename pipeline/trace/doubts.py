@@ -10,7 +10,7 @@ from pipeline.arrays.polyline import tip_tangent
 from pipeline.model import Curve
 from pipeline.status import FrameStatus
 from pipeline.trace.attempt import ENTRY_REACH_MM, Attempt, dense
-from pipeline.trace.onward import FAINTEST, TANGENT_MM
+from pipeline.trace.onward import FAINTEST, GOES_ON, TANGENT_MM
 from pipeline.trace.subtraction import CREST_VOXELS, Subtraction
 from pipeline.trace.tube import Tube
 from pipeline.trace.verdict import LEAST_SEEN, note_of
@@ -83,7 +83,7 @@ def ends_in_nothing(image: Subtraction, tube: Tube, curve: Curve) -> Curve:
     with image.showing(tube.voxels, tube.rest):
         if not goes_on_unseen(image, line[-1], tip_tangent(line, TANGENT_MM), least):
             return curve
-    got, allowed = "a faint line beyond the tip that could not be followed", "a tip with nothing beyond it"
+    got, allowed = f"a faint line {GOES_ON}", "a tip with nothing beyond it"
     do = "look whether the wire's end is fainter than the rest; scan with more dose"
     return replace(curve, status=FrameStatus.TRACE_AMBIGUOUS, note=note_of(got, allowed, do))
 

@@ -8,7 +8,7 @@ from pipeline.model import Array
 from pipeline.status import FrameStatus
 from pipeline.trace.ahead import dark_ahead, hidden_ahead
 from pipeline.trace.attempt import Attempt
-from pipeline.trace.onward import seen_outside
+from pipeline.trace.onward import GOES_ON, seen_outside
 from pipeline.trace.reach import end_range
 from pipeline.trace.section import fills_vessel
 from pipeline.trace.subtraction import Subtraction
@@ -140,7 +140,7 @@ def of_the_ends(
          f"{LATE_MM + LATE_VOXELS * image.voxel:.1f} mm at most",
          "look whether the wire is hidden there, or move entry_mm to where it begins"),
         (attempt.goes_on, FrameStatus.TRACE_AMBIGUOUS,
-         "a line beyond the tip that could not be followed", "a tip with nothing beyond it",
+         f"a line {GOES_ON}", "a tip with nothing beyond it",
          "look whether the wire's end is fainter than the rest"),
         (seen_outside(image, points), FrameStatus.TRACE_LEFT_LUMEN,
          f"a lumen that ends at {_named(image, points[-1])} mm, and something bright beyond it",

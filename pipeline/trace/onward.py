@@ -19,6 +19,8 @@ from pipeline.trace.subtraction import CREST_VOXELS, Subtraction
 from pipeline.trace.tube import Tube
 from pipeline.trace.ways import CONE, cone
 
+GOES_ON = "beyond the tip that could not be followed"
+"""How a doubt about a line there ends: what one frame has may be too faint to be seen in others."""
 REACH_MM = 9.0
 """How far beyond the tip more wire is looked for: a gap of 8 mm and a millimetre."""
 WIDE_VOXELS = 1.2

@@ -10,14 +10,14 @@ import pytest
 from pipeline.model import Curve
 from pipeline.run.log import Log
 from pipeline.run.stages.depths import in_step, shrinking, standing, stated_elsewhere, turned_round
-from pipeline.run.stages.dim_ends import own_dim_ends
+from pipeline.run.stages.dim_ends import faint_ends, own_dim_ends
 from pipeline.run.stages.known import Frame
 from pipeline.run.stages.repeated import once
 from pipeline.run.stages.simulate import with_depth
 from pipeline.run.stages.trace import _last_curve, _Part
 from pipeline.simulate.clamp import Clamp
 from pipeline.status import FrameStatus
-from pipeline.trace import DIM_FROM_TIP, of_catheter, of_length
+from pipeline.trace import DIM_FROM_TIP, GOES_ON, of_catheter, of_length
 from pipeline.trace.config import TraceConfig
 
 
@@ -125,6 +125,24 @@ def test_what_ends_with_a_stated_catheter_is_not_cleared_by_other_depths() -> No
     found, said = own_dim_ends(ends, 0.3)
     assert not said
     assert not any(f.ok for f in found)
+
+
+def test_a_faint_end_that_some_frames_show_is_doubted_in_the_others() -> None:
+    """Of a tip of 5 mm that is faint three frames were refused, two ended 5 mm short, ok, without a word."""
+    lengths = [10.0, 15.0, 20.0, 25.0, 30.0]
+    found = frames(lengths, lengths)
+    unstated = [replace(f, expected_mm=np.nan) for f in found]
+    note = f"trace: end: got a line {GOES_ON}"
+
+    def refused(of: list[Frame], count: int) -> list[Frame]:
+        doubted = [replace(f.curve, status=FrameStatus.TRACE_AMBIGUOUS, note=note) for f in of[:count] if f.curve]
+        return [f.traced_by(curve) for f, curve in zip(of, doubted, strict=False)] + of[count:]
+
+    (said,) = faint_ends(refused(unstated, 3))
+    assert said.startswith(f"in frames 0, 1, 2 a line goes on {GOES_ON}: the wire's end may be too faint in 3, 4, too")
+    assert not faint_ends(refused(unstated, 1)), "one frame of five"
+    assert not faint_ends(refused(found, 3)), "depths are stated, and tell"
+    assert not faint_ends(unstated)
 
 
 def test_a_copy_of_a_frame_is_no_third_that_agrees() -> None:

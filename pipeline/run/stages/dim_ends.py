@@ -5,7 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from pipeline.run.stages.known import Frame
-from pipeline.trace import DIM_FROM_TIP, cleared
+from pipeline.trace import DIM_FROM_TIP, GOES_ON, cleared
+from reports.case_files import listed
 
 FEWEST = 3
 """Frames that must agree."""
@@ -13,6 +14,8 @@ AGREE_VOXELS = 3.0
 """How much the lengths of their dim ends may differ: the step in brightness is located to 1 voxel, the tip to 1.75."""
 MOVED_MM = 5.0
 """By how much the wire must have been pushed between the first and the last of them."""
+GO_ON, MOST_OTHERS = 2, 2.0
+"""Frames in which a line goes on beyond the tip, and how many times as many others, from which these are doubted."""
 
 
 def own_dim_ends(frames: Sequence[Frame], voxel_mm: float) -> tuple[list[Frame], list[str]]:
@@ -39,3 +42,16 @@ def own_dim_ends(frames: Sequence[Frame], voxel_mm: float) -> tuple[list[Frame],
         "catheter's that was pushed with the wire, the tip would lie there"
     )
     return out, [said]
+
+
+def faint_ends(frames: Sequence[Frame]) -> list[str]:
+    """A warning where lines went on beyond the tips of some frames, and those of others may be too faint to be seen."""
+    go_on = [str(f.index) for f in frames if f.stage == "trace" and f.curve is not None and GOES_ON in f.curve.note]
+    others = [str(f.index) for f in frames if f.trusted_curve is not None and np.isnan(f.expected_mm)]
+    if len(go_on) < GO_ON or not 0 < len(others) <= MOST_OTHERS * len(go_on):
+        return []
+    return [
+        f"in frames {listed(go_on)} a line goes on {GOES_ON}: the wire's end may be too faint in {listed(others)}, "
+        "too, whose traces then end short of it, with a sigma that does not say so; state insertion_mm (mm) of each "
+        "frame, or the wire's opacity"
+    ]

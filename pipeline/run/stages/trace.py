@@ -18,7 +18,7 @@ from pipeline.run.projections import grey_window, projections
 from pipeline.run.stages.before import NOTHING, Before
 from pipeline.run.stages.beside import beside_what_is_seen
 from pipeline.run.stages.depths import in_step, shrinking, standing, stated_elsewhere, turned_round
-from pipeline.run.stages.dim_ends import own_dim_ends
+from pipeline.run.stages.dim_ends import faint_ends, own_dim_ends
 from pipeline.run.stages.gaps import own_gaps
 from pipeline.run.stages.known import Context, Frame, Known
 from pipeline.run.stages.own_curves import RESAMPLE, as_given, given_curves, rough
@@ -54,6 +54,7 @@ def trace_frames(run: Context, known: Known) -> Known:
     frames, doubtful_gaps = own_gaps(frames, voxel_mm)
     run.log.warnings += doubtful_gaps
     frames = _in_step(run, turned_round(frames), voxel_mm)
+    run.log.warnings += faint_ends(frames)
     blur_mm = known.lumen.levels.get("scanner_blur_mm", float("nan"))
     run.log.warnings += too_thin(frames, blur_mm, run.case.wire.radius_mm, known.lumen.distance.spacing_mm)
     if not given:
