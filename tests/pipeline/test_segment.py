@@ -12,7 +12,9 @@ from scipy.spatial import cKDTree
 
 from pipeline.model import Volume
 from pipeline.segment import segment
+from pipeline.segment.levels import seed_voxels
 from pipeline.status import FrameStatus, StageError
+from solver import Grid
 from tests.pipeline import phantoms
 
 VOXEL = 0.3
@@ -131,3 +133,10 @@ def test_a_seed_in_the_background_or_outside_is_refused_by_name():
             assert place is not None
             assert np.linalg.norm(np.array(place[1].split(","), float) - seed) < 3 * VOXEL
             assert "move entry_mm (or lumen_seed_mm" in str(error.value), "most cases give no other seed"
+
+
+def test_seeds_outside_the_scan_are_told_where_it_lies() -> None:
+    grid = Grid(np.zeros((4, 5, 6)), [0.5, 0.5, 0.5], [1.0, 2.0, 3.0])
+    with pytest.raises(StageError, match=re.escape("a point inside the scan, [1.0, 2.0, 3.0] to [2.5, 4.0, 5.5] mm")):
+        seed_voxels(grid, [[90.0, 0.0, 0.0]])
+    np.testing.assert_array_equal(seed_voxels(grid, [[90.0, 0.0, 0.0], [1.6, 2.0, 5.4]]), [[1, 0, 5]])
