@@ -25,6 +25,7 @@ ONE_WIRE = 3.0
 """Distance between two insertions' traces over their standard deviation, below which their wires lie alike: two scans
 of one wire are traced twice their standard deviation apart (1.4 times along each of two axes)."""
 WRITTEN = "are one scan, written again"
+OR_ELSE = ", or each a group of its own name where the wire was drawn out and pushed in again between the scans"
 RESCANNED = "tell no more than one insertion that was scanned again"
 NEAREST_MM = 2.0
 """How far off the nearest depth may be, at the least; else half as far as one of its frames is from the next: a trace
@@ -75,12 +76,18 @@ def copies(found: Sequence[Found]) -> list[str]:
             pairs.setdefault(both, []).append((float(np.sqrt(squares / count)), sigma))
     farthest = {both: max(ways) for both, ways in pairs.items()}
     written = {both: mm for both, (mm, sigma) in farthest.items() if mm < ALIKE * sigma}
-    alike = {both: mm for both, (mm, sigma) in farthest.items() if ALIKE * sigma <= mm < ONE_WIRE * sigma}
+    stated = {case.insertion for case in found if case.result.group != case.result.case}
+    alike = {
+        both: mm
+        for both, (mm, sigma) in farthest.items()
+        if ALIKE * sigma <= mm < ONE_WIRE * sigma and not stated.issuperset(both)
+    }
     known_to = min((sigma for _, sigma in farthest.values()), default=math.nan)
     return [
-        f"insertions {listed([*map(repr, names)])} are traced to within {apart:.2g} mm of each other, where traces are "
-        f"known to {known_to:.2g} mm: they {what}, and count as {len(names)}; give their cases one group"
-        for found_alike, what in ((written, WRITTEN), (alike, RESCANNED))
+        f"insertions {listed([*map(repr, names)])} are traced to within {apart:.2g} mm of another of them, where "
+        f"traces are known to {known_to:.2g} mm: they {what}, and count as {len(names)}; give their cases one "
+        f"group{or_else}"
+        for found_alike, what, or_else in ((written, WRITTEN, ""), (alike, RESCANNED, OR_ELSE))
         for names, apart in _together(found_alike)
     ]
 

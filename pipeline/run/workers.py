@@ -17,7 +17,6 @@ from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from multiprocessing import connection, forkserver, resource_tracker
 from pathlib import Path
-from types import ModuleType
 from typing import Any, Generic, NamedTuple, TypeVar
 
 from pipeline import THREADS, one_thread
@@ -162,11 +161,13 @@ def _without_main() -> Iterator[None]:
     A worker needs nothing that is defined there; multiprocessing asks every script for a guard instead.
     """
     main = sys.modules["__main__"]
-    sys.modules["__main__"] = ModuleType("__main__")
+    own = dict(vars(main))
+    main.__spec__ = None  # multiprocessing asks for it, and for the file where there is none
+    vars(main).pop("__file__", None)
     try:
         yield
     finally:
-        sys.modules["__main__"] = main
+        vars(main).update({name: own[name] for name in ("__spec__", "__file__") if name in own})
 
 
 @contextmanager

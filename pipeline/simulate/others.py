@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from itertools import pairwise, product
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from pipeline.arrays.polyline import angle_deg, at_arc, other_units, samples, unit_of
 from pipeline.model import Array, arc_length
@@ -22,6 +23,7 @@ STEP_BACK_MM, BACK = 0.05, -0.5
 TIGHTEST_RADII, QUARTER_DEG = 5.0, 90.0
 """Radius, in the wire's own, of a bend that strains its surface by a fifth; nitinol breaks at about a tenth. A quarter
 of a turn is what it may make on the way of one such quarter, beyond the wire's own curve."""
+STEPS = 4
 ROUNDING_MM = 1e-3
 SAME = 0.15
 """How near log(depth / length) must be to the logarithm of a unit's factor for that unit to be suggested."""
@@ -127,20 +129,27 @@ def quarter_mm(radius_mm: float) -> float:
     return 0.5 * float(np.pi) * TIGHTEST_RADII * radius_mm
 
 
-def tightest_bend(points_mm: Array, radius_mm: float, rest_per_mm: float = 0.0) -> tuple[float, Array] | None:
+def tightest_bend(points_mm: Array, radius_mm: float, rest_per_mm: ArrayLike = 0.0) -> tuple[float, Array] | None:
     """The angle, degrees, by which a wire turns where no wire of this radius does, and the place (3,); None elsewhere.
 
-    rest_per_mm : the largest curvature that the wire was shaped with.
+    rest_per_mm : the curvature that the wire was shaped with, 1/mm, or pairs (distance from the tip in mm, curvature).
+    Of points farther apart than the way on which that is judged nothing is said.
     """
-    reach = quarter_mm(radius_mm)
-    arc = samples(float(arc_length(points_mm)[-1]), 0.25 * reach)
+    reach, length = quarter_mm(radius_mm), arc_length(points_mm)
+    if np.diff(length).max(initial=0.0) > reach:
+        return None
+    arc = samples(float(length[-1]), reach / STEPS)
     step = np.diff(at_arc(points_mm, arc), axis=0)
     along = step / np.maximum(np.linalg.norm(step, axis=1), 1e-12)[:, None]
-    turn = np.degrees(np.arccos(np.clip(np.sum(along[:-5] * along[5:], axis=1), -1.0, 1.0)))
-    if not len(turn) or turn.max() <= QUARTER_DEG + np.degrees(rest_per_mm * reach):
+    turn = np.degrees(np.arccos(np.clip(np.sum(along[:-STEPS] * along[STEPS:], axis=1), -1.0, 1.0)))
+    profile = np.atleast_2d(np.asarray(rest_per_mm, dtype=np.float64))
+    from_tip = arc[-1] - arc[: len(turn)]
+    ends = [np.interp(from_tip - reach * share, np.r_[profile[:, 0]], profile[:, -1]) for share in (0.0, 0.5, 1.0)]
+    beyond = turn - QUARTER_DEG - np.degrees(reach * np.abs(ends).max(axis=0))
+    if not len(turn) or beyond.max() <= 0.0:
         return None
-    worst = int(np.argmax(turn))
-    return float(turn[worst]), at_arc(points_mm, arc[worst + 3 : worst + 4])[0]
+    worst = int(np.argmax(beyond))
+    return float(turn[worst]), at_arc(points_mm, arc[[worst + STEPS // 2 + 1]])[0]
 
 
 def not_to_depth(length_mm: float, depth_mm: float, tolerance_mm: float, stated: str = "mm") -> str:

@@ -70,7 +70,7 @@ class Used(Table):
     case: str
     group: str
     data: tuple[str, ...]
-    traced_mm: tuple[tuple[Point, ...], ...] = ()
+    traced_mm: tuple[Annotated[tuple[Point, ...], Field(min_length=1)], ...] = ()
 
 
 class Parameters(Table):

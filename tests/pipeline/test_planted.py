@@ -280,7 +280,7 @@ def test_scans_of_one_wire_under_several_names_are_told(out: Path) -> None:
         for case in found
     ]
     (said,) = copies(alike)
-    assert said.startswith("insertions 'bend', 'bend-2', 'bend-3' are traced to within 0.0032 mm of each other")
+    assert said.startswith("insertions 'bend', 'bend-2', 'bend-3' are traced to within 0.0032 mm of another of")
     assert "they are one scan, written again, and count as 3; give their cases one group" in said
 
 
@@ -300,6 +300,8 @@ def test_one_wire_that_was_scanned_again_is_told(out: Path) -> None:
     ]
     (said,) = copies(alike)
     assert "they tell no more than one insertion that was scanned again, and count as 3" in said
+    own = [replace(c, result=replace(c.result, group="own")) for c in alike]
+    assert not copies(own), "who states groups says that each was pushed in anew"
 
 
 def test_insertions_with_references_of_their_own_are_guesses_for_each_other(

@@ -285,6 +285,10 @@ def test_a_folded_wire_passes_no_gate_of_warnings(known: Known, tmp_path: Path) 
     sharp = tightest_bend(folded(made(), 8.0, 1.2), 0.18)
     assert sharp is not None
     assert sharp[0] > 120.0
+    curved_tip = [[0.0, 0.5], [5.0, 0.5], [5.0, 0.0]]
+    assert tightest_bend(folded(made(), 12.0, 1.2), 0.18, curved_tip), "the fold is behind the curve of its tip"
+    assert tightest_bend(folded(made(), 8.0, 4.0), 0.18) is None, "a loop of 2 mm radius is no fold"
+    assert tightest_bend(folded(made(), 8.0, 1.2)[::8], 0.18) is None, "points so far apart tell nothing"
     wires = [*known[1][:2], *(folded(resample(wire, 0.25), 6.0, 1.2) for wire in known[1][2:])]
     folder = write_csv(tmp_path / "folded", wires)
     _, table, result = run_with(known, f'"{folder}/*.csv"', "folded")

@@ -99,8 +99,7 @@ def _taken(run: Context, known: Known, frame: Frame, file: OtherFile) -> Frame:
 
 def _kinked(wires: Mapping[int, Array], wire: Wire) -> list[str]:
     """A warning where wires (n, 3), by frame, turn as no wire of this radius does."""
-    rest = float(np.abs(np.atleast_2d(wire.rest_curvature_per_mm)[:, -1]).max())
-    bends = {n: tightest_bend(points, wire.radius_mm, rest) for n, points in wires.items()}
+    bends = {n: tightest_bend(wires[n], wire.radius_mm, wire.rest_curvature_per_mm) for n in wires}
     found = {n: bend for n, bend in bends.items() if bend is not None}
     if not found:
         return []

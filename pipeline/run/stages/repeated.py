@@ -18,9 +18,11 @@ from pipeline.run.stages.known import Frame
 from pipeline.status import FrameStatus
 
 ALIKE = 0.4
-"""Distance between two traces over their standard deviation, below which they are of one scan. Two scans of one wire
-are traced twice the standard deviation apart (1.4 times along each of two axes), those of a scan written again with a
-grey more or less 0.02 to 0.3 times."""
+"""Distance between two traces over their standard deviation, below which they are of one wire that lay still: two scans
+of it with noise are traced up to twice the standard deviation apart (1.4 times along each of two axes), a scan that is
+written again with a grey more or less 0.02 to 0.3 times. With little noise that standard deviation is not noise's, and
+two scans cannot be told from one."""
+MOST_NAMED = 3
 STEP_MM = 2.0
 """Between the points that are kept of a trace."""
 TIP = "tip "
@@ -29,22 +31,34 @@ OF_CALIBRATION = "a scan that was calibrated with"
 
 
 def once(frames: Sequence[Frame], calibrated: Collection[str] = (), traced_mm: Sequence[ArrayLike] = ()) -> list[Frame]:
-    """Fail each frame whose scan is an earlier one's, or one that was calibrated with: by its voxels or its trace.
+    """Fail each frame that has the voxels of an earlier one, or whose scan was calibrated with, by voxels or trace.
 
     calibrated : ``Frame.voxels`` of these scans.     traced_mm : points (n, 3) on their traces, as ``kept`` has them.
     """
     out, first = list(frames), dict[str, int]()
+    learnt = [(OF_CALIBRATION, np.asarray(points, dtype=np.float64)) for points in traced_mm]
     for n, frame in enumerate(frames):
         same = first.setdefault(frame.voxels, n)
         whose = OF_CALIBRATION if frame.voxels in calibrated else f"frame {same}" if frame.voxels and same != n else ""
-        if whose:
-            out[n] = _repeated(frame, _the_same(frame.voxels, whose))
-    earlier = [(OF_CALIBRATION, np.asarray(points, dtype=np.float64)) for points in traced_mm]
-    for n, frame in enumerate(out):
-        if (curve := frame.trusted_curve) is not None:
-            out[n] = _repeated(frame, why) if (why := _alike(curve, earlier)) else frame
-            earlier.append((f"frame {n}", kept(curve)))
+        why = _the_same(frame.voxels, whose) if whose else _alike(frame, learnt)
+        out[n] = _repeated(frame, why) if why else frame
     return out
+
+
+def alike(frames: Sequence[Frame]) -> list[str]:
+    """A warning where scans are traced as one scan is, or as one wire is in scans with little noise."""
+    earlier: list[tuple[str, Array]] = []
+    said: list[str] = []
+    for frame in frames:
+        if (curve := frame.trusted_curve) is not None:
+            said += [f"frame {frame.index} {why}"] if (why := _alike(frame, earlier)) else []
+            earlier.append((f"frame {frame.index}", kept(curve)))
+    if not said:
+        return []
+    return [
+        f"{'; '.join(said[:MOST_NAMED])}{f'; and {len(said) - MOST_NAMED} more' * (len(said) > MOST_NAMED)}: one scan "
+        "that was written again, or one wire that was scanned twice, and it counts as often; take all but one out"
+    ]
 
 
 def kept(curve: Curve) -> Array:
@@ -54,22 +68,24 @@ def kept(curve: Curve) -> Array:
 
 def _the_same(voxels: str, whose: str) -> str:
     """In words, what two frames have in common that are known by the same."""
-    return f"it ends where {whose} does, to 0.01 mm" if voxels.startswith(TIP) else f"it has the voxels of {whose}"
+    return f"ends where {whose} does, to 0.01 mm" if voxels.startswith(TIP) else f"has the voxels of {whose}"
 
 
-def _alike(curve: Curve, earlier: Sequence[tuple[str, Array]]) -> str:
-    """Of which earlier scan a curve is, in words; empty where of none, or where nobody knows how well it is traced."""
+def _alike(frame: Frame, earlier: Sequence[tuple[str, Array]]) -> str:
+    """As which earlier scan a frame is traced, in words; empty where as none, or where nobody knows how well it is."""
+    curve = frame.trusted_curve
+    if curve is None:
+        return ""
     near = ALIKE * float(np.median(curve.sigma_mm))
     for whose, points in earlier:
         if math.dist(points[-1], curve.points_mm[-1]) < ALIKE * curve.tip_sigma_mm:
             apart = rms(point_to_curve(points, curve.points_mm)[0])
             if apart < near:
-                known = f"where traces are known to {near / ALIKE:.2g} mm"
-                return f"it is traced to within {apart:.2g} mm of {whose}, {known}: one scan, written again"
+                return f"is traced to within {apart:.2g} mm of {whose} (traces are known to {near / ALIKE:.2g} mm)"
     return ""
 
 
 def _repeated(frame: Frame, why: str) -> Frame:
     """The frame, not counted, whatever is wrong with its trace: that others agree with it would be nothing new."""
     as_read = replace(frame, status=FrameStatus.OK.identifier)
-    return as_read.failed("load", FrameStatus.REPEATED, why)
+    return as_read.failed("load", FrameStatus.REPEATED, f"it {why}")
