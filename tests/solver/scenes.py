@@ -112,21 +112,30 @@ def same_bits(a: Solution, b: Solution) -> None:
         assert np.array_equal(value, other) if isinstance(value, np.ndarray) else value == other, name
 
 
-def held_by_friction() -> tuple[GuideWire, VesselWall, float]:
-    """A vessel of random bends and widths, with friction 0.3, that holds a wire fast at 28 mm: wire, wall, roll."""
-    rng = np.random.default_rng([7, 133])
-    along, place, path = np.array([0.0, 0.0, 1.0]), np.array([0.0, 0.0, 3.0]), []
-    while 0.25 * len(path) < 45.0:
-        radius, axis = rng.uniform(3, 25), np.cross(along, rng.normal(size=3))
+def winding(rng: np.random.Generator, length_mm: float, tightest_mm: float, most_rad: float) -> Array:
+    """Points (n, 3) every quarter of a millimetre: 8 mm straight on, then bends at random, some with a straight piece
+    behind them.
+
+    tightest_mm, most_rad : the least radius of a bend, and the most that it turns.
+    """
+    along, place, path = np.array([0.0, 0.0, 1.0]), np.array([0.0, 0.0, 3.0]), list[Array]()
+    while 0.25 * len(path) < length_mm:
+        radius, axis = rng.uniform(tightest_mm, 25), np.cross(along, rng.normal(size=3))
         bend = Rotation.from_rotvec(axis / np.linalg.norm(axis) * 0.25 / radius)
-        steps = [bend] * int(rng.uniform(3, 1.6 * radius) / 0.25)
+        steps = [bend] * int(rng.uniform(3, most_rad * radius) / 0.25)
         if rng.random() < 0.4:
             steps += [Rotation.identity()] * int(rng.uniform(2, 8) / 0.25)
         for turn in steps:
             along = turn.apply(along)
             place = place + 0.25 * along
             path.append(place)
-    points = np.vstack([np.linspace([0.0, 0.0, -5.0], [0.0, 0.0, 3.0], 33), path])
+    return np.vstack([np.linspace([0.0, 0.0, -5.0], [0.0, 0.0, 3.0], 33), path])
+
+
+def held_by_friction() -> tuple[GuideWire, VesselWall, float]:
+    """A vessel of random bends and widths, with friction 0.3, that holds a wire fast at 28 mm: wire, wall, roll."""
+    rng = np.random.default_rng([7, 133])
+    points = winding(rng, 45.0, 3.0, 1.6)
     wide = rng.uniform(0.7, 2.2) * (1.0 + 0.625 * gaussian_filter1d(rng.normal(size=len(points)), 12))
     low = points.min(axis=0) - 4.0
     axes = [np.arange(a, b, 0.5) for a, b in zip(low, points.max(axis=0) + 4.5, strict=True)]

@@ -11,35 +11,17 @@ import argparse
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 from scipy.spatial import cKDTree
-from scipy.spatial.transform import Rotation
 
 from pipeline.benchmark.snaps import EQUAL_MM, SHORT_MM, apart_mm
 from solver import Catheter, Grid, GuideWire, Insertion, Solution, VesselWall
-from tests.solver.scenes import Array
+from tests.solver.scenes import winding
 
 AHEAD_MM = 14.0
 
 
-def axis_of(rng: np.random.Generator) -> Array:
-    """Points of a winding axis every quarter of a millimetre, from -5 mm on."""
-    along, place = np.array([0.0, 0.0, 1.0]), np.array([0.0, 0.0, 3.0])
-    path: list[Array] = []
-    while 0.25 * len(path) < 60.0:
-        radius, axis = rng.uniform(5, 25), np.cross(along, rng.normal(size=3))
-        bend = Rotation.from_rotvec(axis / np.linalg.norm(axis) * 0.25 / radius)
-        steps = [bend] * int(rng.uniform(3, 1.4 * radius) / 0.25)
-        if rng.random() < 0.4:
-            steps += [Rotation.identity()] * int(rng.uniform(2, 8) / 0.25)
-        for turn in steps:
-            along = turn.apply(along)
-            place = place + 0.25 * along
-            path.append(place)
-    return np.vstack([np.linspace([0.0, 0.0, -5.0], [0.0, 0.0, 3.0], 33), path[:260]])
-
-
 def vessel(rng: np.random.Generator) -> VesselWall:
     """A vessel of random width with one to four sacs."""
-    points, sacs = axis_of(rng), []
+    points, sacs = winding(rng, 60.0, 5.0, 1.4)[: 33 + 260], []
     wide = np.clip(rng.uniform(0.9, 2.2) * (1 + 0.3 * gaussian_filter1d(rng.normal(size=len(points)), 12)), 0.5, 3)
     for _ in range(rng.integers(1, 5)):
         i = rng.integers(53, len(points) - 20)
