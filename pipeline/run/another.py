@@ -76,12 +76,8 @@ def copies(found: Sequence[Found]) -> list[str]:
             pairs.setdefault(both, []).append((float(np.sqrt(squares / count)), sigma))
     farthest = {both: max(ways) for both, ways in pairs.items()}
     written = {both: mm for both, (mm, sigma) in farthest.items() if mm < ALIKE * sigma}
-    stated = {case.insertion for case in found if case.result.group != case.result.case}
-    alike = {
-        both: mm
-        for both, (mm, sigma) in farthest.items()
-        if ALIKE * sigma <= mm < ONE_WIRE * sigma and not stated.issuperset(both)
-    }
+    near = {both: mm for both, (mm, sigma) in farthest.items() if ALIKE * sigma <= mm < ONE_WIRE * sigma}
+    alike = {both: mm for both, mm in near.items() if not _stated_apart(both, found)}
     known_to = min((sigma for _, sigma in farthest.values()), default=math.nan)
     return [
         f"insertions {listed([*map(repr, names)])} are traced to within {apart:.2g} mm of another of them, where "
@@ -90,6 +86,16 @@ def copies(found: Sequence[Found]) -> list[str]:
         for found_alike, what, or_else in ((written, WRITTEN, ""), (alike, RESCANNED, OR_ELSE))
         for names, apart in _together(found_alike)
     ]
+
+
+def _stated_apart(both: tuple[str, ...], found: Sequence[Found]) -> bool:
+    """Whether two insertions are stated to be two: by groups of their own names, or by other rolls."""
+    own = [[case for case in found if case.insertion == name] for name in both]
+    rolls = [
+        {round(frame.row.get("roll_deg") or 0.0, 3) for c in cases for frame in c.frames.values()} for cases in own
+    ]
+    grouped = [any(case.result.group != case.result.case for case in cases) for cases in own]
+    return all(grouped) or rolls[0] != rolls[1]
 
 
 def _together(apart: Mapping[tuple[str, ...], float]) -> list[tuple[list[str], float]]:
