@@ -66,6 +66,14 @@ def tip_tangent(curve_mm: ArrayLike, over_mm: float = 1.0) -> Array:
     return np.asarray(chord / norm) if norm > 0 else np.zeros(3)
 
 
+def turns_deg(curve_mm: Array, apart: int) -> Array:
+    """Angles (m,), degrees, between the segments of a polyline (n, 3) that are ``apart`` segments from each other."""
+    along = np.diff(curve_mm, axis=0)
+    along /= np.maximum(np.linalg.norm(along, axis=1), 1e-12)[:, None]
+    cosine = np.sum(along[apart:] * along[:-apart], axis=1)
+    return np.asarray(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))
+
+
 def angle_deg(a: Array, b: Array) -> float:
     """Angle between two vectors (3,) by atan2: arccos loses half the digits near 0."""
     return float(np.degrees(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b)))

@@ -60,7 +60,7 @@ def of_one_phantom(found: Sequence[Found]) -> list[list[Found]]:
 
 
 def copies(found: Sequence[Found]) -> list[str]:
-    """A sentence for each two insertions whose traces lie nearer to each other than those of two insertions do.
+    """A sentence for insertions, two or more, whose traces lie nearer to each other than those of several do.
 
     found : of ``with_another``. A scan that was written again (another format, rounded, with a grey more of noise) is
     traced alike to a hundredth of a voxel; another scan of one wire has noise of its own, and one that was drawn out

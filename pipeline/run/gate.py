@@ -3,7 +3,7 @@
 import math
 import operator
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -43,14 +43,14 @@ class Gate:
         return "" if passed else f"gate closed: {self.asked}: {self.column} is {value:.4g}"
 
 
-def held(gates: Iterable[Gate], out: Path, overall: Mapping[str, Any]) -> dict[str, str]:
+def held(gates: Sequence[Gate], out: Path, overall: Mapping[str, Any]) -> dict[str, str]:
     """By what was asked, why a run must not pass, empty where it may.
 
     Errors of wires that were made from the traces open no gate. overall : the row of the run into ``out``.
     """
     from reports.case_files import copied_from_traces, warnings_in  # half a second, for a gate that may be refused
 
-    copied = copied_from_traces(warnings_in(out))
+    copied = copied_from_traces(warnings_in(out)) if gates else ""  # reads the results of all cases
     return {g.asked: f"gate closed: {g.asked}: {copied}" if copied else g.closed(overall) for g in gates}
 
 

@@ -9,7 +9,7 @@ from itertools import pairwise, product
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pipeline.arrays.polyline import angle_deg, at_arc, other_units, samples, unit_of
+from pipeline.arrays.polyline import angle_deg, at_arc, other_units, samples, turns_deg, unit_of
 from pipeline.model import Array, arc_length
 
 AT_ENTRY_MM = 5.0
@@ -23,7 +23,7 @@ STEP_BACK_MM, BACK = 0.05, -0.5
 TIGHTEST_RADII, QUARTER_DEG = 5.0, 90.0
 """Radius, in the wire's own, of a bend that strains its surface by a fifth; nitinol breaks at about a tenth. A quarter
 of a turn is what it may make on the way of one such quarter, beyond the wire's own curve."""
-STEPS = 4
+STEPS = 4  # of the way on which that is judged
 ROUNDING_MM = 1e-3
 SAME = 0.15
 """How near log(depth / length) must be to the logarithm of a unit's factor for that unit to be suggested."""
@@ -139,12 +139,10 @@ def tightest_bend(points_mm: Array, radius_mm: float, rest_per_mm: ArrayLike = 0
     if np.diff(length).max(initial=0.0) > reach:
         return None
     arc = samples(float(length[-1]), reach / STEPS)
-    step = np.diff(at_arc(points_mm, arc), axis=0)
-    along = step / np.maximum(np.linalg.norm(step, axis=1), 1e-12)[:, None]
-    turn = np.degrees(np.arccos(np.clip(np.sum(along[:-STEPS] * along[STEPS:], axis=1), -1.0, 1.0)))
+    turn = turns_deg(at_arc(points_mm, arc), STEPS)
     profile = np.atleast_2d(np.asarray(rest_per_mm, dtype=np.float64))
     from_tip = arc[-1] - arc[: len(turn)]
-    ends = [np.interp(from_tip - reach * share, np.r_[profile[:, 0]], profile[:, -1]) for share in (0.0, 0.5, 1.0)]
+    ends = [np.interp(from_tip - reach * share, profile[:, 0], profile[:, -1]) for share in (0.0, 0.5, 1.0)]
     beyond = turn - QUARTER_DEG - np.degrees(reach * np.abs(ends).max(axis=0))
     if not len(turn) or beyond.max() <= 0.0:
         return None

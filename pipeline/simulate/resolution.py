@@ -24,8 +24,6 @@ AGREED_MM = 0.06
 SMALLEST_MM = 0.001
 """Below it contacts that open and close on the voxels of the wall hide the order of convergence."""
 
-MOST_OVERLAP_RADII = 0.1
-"""Overlap of the wire with itself, in radii, that still counts as a touch: less than a scan can show."""
 LARGEST_JOINT_TURN_DEG = 30.0
 """Beyond it the chain's bending energy, quadratic in the angle, is off by 2 % and more."""
 

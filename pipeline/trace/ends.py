@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from pipeline.arrays.polyline import turns_deg
 from pipeline.model import Array
 from pipeline.status import FrameStatus
 from pipeline.trace.ahead import dark_ahead, hidden_ahead
@@ -56,13 +57,7 @@ def beside_itself(points: Array, step: float, near: float) -> NDArray[np.bool_]:
 
 def sharpest_turn_deg(points: Array, step: float, reach: float) -> float:
     """Largest angle by which a curve (n, 3), points ``step`` mm apart, turns within ``reach`` mm."""
-    along = np.diff(points, axis=0)
-    along /= np.maximum(np.linalg.norm(along, axis=1), 1e-12)[:, None]
-    apart = max(1, round(reach / max(step, 1e-9)))
-    if len(along) <= apart:
-        return 0.0
-    cosine = np.sum(along[apart:] * along[:-apart], axis=1)
-    return float(np.degrees(np.arccos(np.clip(cosine.min(), -1.0, 1.0))))
+    return float(turns_deg(points, max(1, round(reach / max(step, 1e-9)))).max(initial=0.0))
 
 
 def _named(image: Subtraction, point: Array) -> str:

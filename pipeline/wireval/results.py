@@ -151,8 +151,9 @@ def read_run(out: Path, gates: Sequence[str] = ()) -> Results:
 def with_gates(found: Results, gates: Sequence[str]) -> Results:
     """The results with a sentence for each ``fail_if`` that holds: of a score, of every simulator but the solver."""
     others = {name: folder for name, folder in folders_in(found.out).items() if name != OURS}
-    judged = {f"{name}: ": held(map(gate, gates), folder, _pooled(folder)) for name, folder in others.items()}
-    judged = judged or {"": held(map(gate, gates), found.out, _pooled(found.out))}
+    asked = [gate(text) for text in gates]
+    own = {f"{name}: ": folder for name, folder in others.items()} or {"": found.out}
+    judged = {whose: held(asked, folder, _pooled(folder)) for whose, folder in own.items()}
     return replace(found, closed=tuple(f"{whose}{why}" for whose, own in judged.items() for why in own.values() if why))
 
 

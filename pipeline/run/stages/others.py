@@ -9,6 +9,7 @@ import numpy as np
 from pipeline.arrays.polyline import resample
 from pipeline.load.wires import OtherFile, read_wires
 from pipeline.model import Array, OtherWire, Wire, arc_length
+from pipeline.run.stages.in_itself import not_in_itself
 from pipeline.run.stages.known import Context, Frame, Known
 from pipeline.run.stages.own_curves import rough
 from pipeline.simulate import wall_of
@@ -22,7 +23,6 @@ from pipeline.simulate.others import (
     quarter_mm,
     tightest_bend,
 )
-from pipeline.simulate.resolution import MOST_OVERLAP_RADII
 from pipeline.status import FrameStatus
 from reports.case_files import counted
 from solver.self_contact import self_overlap_mm
@@ -88,10 +88,8 @@ def _taken(run: Context, known: Known, frame: Frame, file: OtherFile) -> Frame:
     points = begun(file.points_mm, clamp.entry_mm, clamp.direction)
     deepest = float(_clearance(known, points).max()) + case.wire.radius_mm
     found = replace(frame, simulated=OtherWire(points, max(deepest, 0.0)))
-    overlap = self_overlap_mm(points, case.wire.radius_mm)
-    if overlap > MOST_OVERLAP_RADII * case.wire.radius_mm:
-        what = f"{file.name}: the wire lies {overlap:.2f} mm deep in itself"
-        return found.failed("simulate", FrameStatus.SELF_CONTACT, what)
+    radius = case.wire.radius_mm
+    found = not_in_itself(found, self_overlap_mm(points, radius), radius, f"{file.name}: the wire")
     length = float(arc_length(points)[-1])
     wrong = not_to_depth(length, frame.depth_mm, run.config.trace.length_tolerance_mm, file.unit)
     return found.failed("simulate", FrameStatus.NOT_TO_DEPTH, f"{file.name}: {wrong}") if wrong else found

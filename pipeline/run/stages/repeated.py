@@ -1,7 +1,7 @@
 """Scans that occur twice, in a case or among those of a calibration: of the same voxels, or traced as one scan is.
 
 A scan that was written again (in another format, rounded, with a grey more or a little noise) has other voxels, and is
-traced alike to a hundredth of a voxel. Two scans of one wire are not, as each has noise of its own.
+traced alike to a hundredth of a voxel. Two scans of one wire are not, unless their noise is little.
 """
 
 import math

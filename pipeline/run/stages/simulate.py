@@ -11,12 +11,13 @@ from pipeline.run.log import Log
 from pipeline.run.stages.clamp import clamp_of
 from pipeline.run.stages.clues import beside_clues, clues_of
 from pipeline.run.stages.covered import deep_in_itself_mm, too_thick
+from pipeline.run.stages.in_itself import not_in_itself
 from pipeline.run.stages.known import Context, Frame, Known
 from pipeline.run.stages.others import frames_of_others
 from pipeline.run.stages.roll import with_fitted_roll
 from pipeline.simulate import LEVELS, altered, insertion_of, simulate, wall_of
 from pipeline.simulate.clamp import depth_from
-from pipeline.simulate.resolution import LARGEST_JOINT_TURN_DEG, MOST_OVERLAP_RADII, Resolved, lengths_mm, resolve
+from pipeline.simulate.resolution import LARGEST_JOINT_TURN_DEG, Resolved, lengths_mm, resolve
 from pipeline.status import FrameStatus, StageError
 from reports.case_files import counted
 from solver import Snap, Solution
@@ -117,16 +118,14 @@ def judged(frame: Frame, wire: Solution, radius_mm: float, catheter: OverWire | 
     """The frame, failed where its wire is not at rest, cannot follow a bend, or lies in itself, as its catheter may."""
     if not wire.converged:
         return frame.failed("simulate", wire.status)
-    turn, overlap = wire.largest_turn_deg, wire.self_overlap_mm
+    turn = wire.largest_turn_deg
     if turn > LARGEST_JOINT_TURN_DEG:
         return frame.failed("simulate", FrameStatus.UNDER_RESOLVED, f"a joint is turned by {turn:.0f} degrees")
-    if overlap > MOST_OVERLAP_RADII * radius_mm:
-        return frame.failed("simulate", FrameStatus.SELF_CONTACT, f"the wire lies {overlap:.2f} mm deep in itself")
-    overlap = 0.0 if catheter is None else deep_in_itself_mm(catheter, frame, wire)
-    if catheter is not None and overlap > MOST_OVERLAP_RADII * catheter.radius_mm:
-        what = f"the catheter of radius_mm = {catheter.radius_mm:g} lies {overlap:.2f} mm deep in itself"
-        return frame.failed("simulate", FrameStatus.SELF_CONTACT, what)
-    return frame
+    frame = not_in_itself(frame, wire.self_overlap_mm, radius_mm)
+    if catheter is None:
+        return frame
+    what = f"the catheter of radius_mm = {catheter.radius_mm:g}"
+    return not_in_itself(frame, deep_in_itself_mm(catheter, frame, wire), catheter.radius_mm, what)
 
 
 def _noted(log: Log, frames: Sequence[Frame], found: Iterator[Solution], total: int) -> Iterator[Solution]:
