@@ -52,7 +52,8 @@ def beside_the_wall(lumen: Lumen, scan: Volume) -> list[str]:
         away = ", ".join(f"{-s:.2f}" for s in shift)
         off.append(f"({away}) mm (LPS) away from where the scan shows the vessel")
     told = " and ".join(off)
-    return [f"the given lumen lies {told}: check its registration, its unit and how it was segmented"] * bool(off)
+    do = "check its axes (LPS or RAS), registration and unit, and how it was segmented"
+    return [f"the given lumen lies {told}: {do}"] * bool(off)
 
 
 def _near(lumen: Lumen, reach_mm: float) -> tuple[Array, Array, Array]:

@@ -277,7 +277,7 @@ def test_a_wire_that_lies_nearer_to_traces_than_these_are_known_is_no_news(
     """A simulator that handed the traces back came first, without a word; so did own traces that were its wires."""
     curve = Curve(np.zeros((5, 3)), np.full(5, sigma_mm))
     errors = cast(Any, SimpleNamespace(error_mm=np.full(40, off_mm)))
-    warnings = _too_near([Frame(0, curve=curve, comparison=errors), Frame(1)], handed=True)
+    warnings = _too_near([Frame(0, curve=curve, comparison=errors), Frame(1)], 0.5, handed=True)
     assert len(warnings) == said
     assert all("made from the traces" in text for text in warnings)
 
@@ -287,7 +287,7 @@ def test_one_frame_that_was_made_from_its_trace_is_enough() -> None:
     curve, off_mm = Curve(np.zeros((5, 3)), np.full(5, 0.05)), [0.001, 0.06, 0.001, 0.002, 0.0]
     errors = [cast(Any, SimpleNamespace(error_mm=np.full(40, mm))) for mm in off_mm]
     frames = [Frame(n, curve=curve, comparison=error) for n, error in enumerate(errors)]
-    (said,) = _too_near(frames, handed=True)
+    (said,) = _too_near(frames, 0.5, handed=True)
     assert said.startswith("in 4 frames (0, 2, 3, 4) the simulated wires lie within 0.002 mm (rms) of the traced ones")
 
 
@@ -295,9 +295,11 @@ def test_the_solvers_own_wire_may_lie_near_a_trace_that_is_little_known() -> Non
     """A soft phantom widens the sigma of its traces: an error of 0.06 mm was that of a wire made from the trace."""
     curve = Curve(np.zeros((5, 3)), np.full(5, 0.34))
     frame = Frame(0, curve=curve, comparison=cast(Any, SimpleNamespace(error_mm=np.full(40, 0.06))))
-    assert not _too_near([frame], handed=False)
-    short = Frame(0, curve=curve, comparison=cast(Any, SimpleNamespace(error_mm=np.full(6, 0.001))))
-    assert not _too_near([short, short], handed=True), "few points may lie near by chance"
+    assert not _too_near([frame], 0.5, handed=False)
+    errors = cast(Any, SimpleNamespace(error_mm=np.full(6, 0.001)))
+    short = [Frame(n, curve=curve, comparison=errors) for n in range(2)]
+    assert not _too_near(short, 0.5, handed=True), "few points may lie near by chance"
+    assert _too_near(short, 1.0, handed=True), "twelve millimetres of them are no chance, however sampled"
 
 
 def test_tips_that_lie_beside_the_true_ones_in_half_of_the_frames_are_told() -> None:

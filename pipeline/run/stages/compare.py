@@ -39,7 +39,7 @@ def compare_frames(run: Context, known: Known) -> Known:
     frames, entries = _all_compared(run, known, clues, simulated, entered)
     known = replace(known, frames=frames, entries=entries)
     run.log.warnings += [
-        *_too_near(known.frames, handed=run.case.simulated is not None),
+        *_too_near(known.frames, run.config.compare.sample_mm, handed=run.case.simulated is not None),
         *_truth_elsewhere(known.frames, _voxel_mm(known)),
         *_rough_truth(known),
     ]
@@ -117,9 +117,9 @@ NEAREST = 0.2
 solver's own, in 82 frames of the catalogue and a bend, lies 0.59 of it off."""
 
 
-FEWEST_POINTS = 20
-"""Points of such frames, half a millimetre apart, from which that is no chance: with 2 mm in each of three frames it is
-one in 1.5 % of the cases of a perfect simulator."""
+LEAST_MM, APART_MM = 10.0, 1.0
+"""Length of such frames from which that is no chance: with 2 mm in each of three frames it is one in 1.5 % of the cases
+of a perfect simulator. Points that are farther apart than a trace's errors reach count as many as they are."""
 NEAREST_MM = 0.01
 """The same where the curves are the user's own, of unknown standard deviation: no scan shows a wire so well."""
 TRUTH_VOXELS, TRUTH_TIP_VOXELS, TRUTH_TIPS_VOXELS = 0.3, 3.0, 1.5
@@ -167,15 +167,16 @@ def _voxel_mm(known: Known) -> float:
     return float(max(known.lumen.distance.spacing_mm))
 
 
-def _too_near(frames: Sequence[Frame], *, handed: bool) -> list[str]:
+def _too_near(frames: Sequence[Frame], sample_mm: float, *, handed: bool) -> list[str]:
     """A warning where wires lie nearer to the traces than these can be known, be it in some of the frames alone.
 
+    sample_mm : how far apart errors are taken.
     handed : the wires are another simulator's. Of the solver's own, traces that were made from them are looked for.
     """
     seen = [(f.index, f.comparison.error_mm, f.curve) for f in frames if f.ok and f.comparison and f.curve]
     each = {n: (rms(error), float(np.median(curve.sigma_mm)), len(error)) for n, error, curve in seen}
     near = {n: (mm, sigma) for n, (mm, sigma, _) in each.items() if mm < _nearest_mm(sigma, handed=handed)}
-    if sum(each[n][2] for n in near) < FEWEST_POINTS:
+    if min(sample_mm, APART_MM) * sum(each[n][2] for n in near) < LEAST_MM:
         return []
     off, sigma = np.max(list(near.values()), axis=0)
     some = f"in {counted(len(near), 'frame')} ({listed([*map(str, near)], MOST_NAMED)}) " * (len(near) < len(each))
