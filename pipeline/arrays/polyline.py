@@ -66,6 +66,12 @@ def tip_tangent(curve_mm: ArrayLike, over_mm: float = 1.0) -> Array:
     return np.asarray(chord / norm) if norm > 0 else np.zeros(3)
 
 
+def tangents(curve_mm: ArrayLike, arc_mm: Array, reach_mm: float) -> Array:
+    """Unit vectors (n, 3) along a polyline at arc lengths (n,), from ``reach_mm`` behind to as far ahead of each."""
+    chords = at_arc(curve_mm, arc_mm + reach_mm) - at_arc(curve_mm, np.maximum(arc_mm - reach_mm, 0.0))
+    return np.asarray(chords / np.maximum(np.linalg.norm(chords, axis=1), 1e-12)[:, None])
+
+
 def turns_deg(curve_mm: Array, apart: int) -> Array:
     """Angles (m,), degrees, between the segments of a polyline (n, 3) that are ``apart`` segments from each other."""
     along = np.diff(curve_mm, axis=0)

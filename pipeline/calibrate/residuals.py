@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cholesky, solve_triangular
 
-from pipeline.arrays.polyline import at_arc
+from pipeline.arrays.polyline import at_arc, tangents
 from pipeline.calibrate.trials import Point, Trial, depths_at
 from pipeline.model import Array
 from pipeline.simulate.evidence import TraceSamples, covariance_of_traces
@@ -169,8 +169,7 @@ def along(wire: Solution, arc_mm: Array) -> tuple[Array, Array]:
     """Points and tangents (n, 3) of a wire at arc lengths from its clamp, straight on beyond its ends."""
     curve = wire.joints_mm
     arc = np.maximum(arc_mm, 0.0)
-    tangent = at_arc(curve, arc + TANGENT_MM) - at_arc(curve, np.maximum(arc - TANGENT_MM, 0.0))
-    tangent /= np.linalg.norm(tangent, axis=1)[:, None]
+    tangent = tangents(curve, arc, TANGENT_MM)
     return at_arc(curve, arc) + np.minimum(arc_mm, 0.0)[:, None] * tangent, tangent
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.arrays.polyline import at_arc, resample, samples
+from pipeline.arrays.polyline import at_arc, resample, samples, tangents
 from pipeline.compare.config import CompareConfig
 from pipeline.compare.metrics import METRICS, Pair, VesselAxis, measured, point_to_curve, rms, scored
 from pipeline.model import Array, Lumen, arc_length
@@ -90,9 +90,7 @@ def shift_of(screen: Screen, wire_mm: Array, fitted: bool) -> Array:
     for _ in range(ROUNDS):
         here = part + shift @ axes
         foot = point_to_curve(here, screen.curve_mm)[1]
-        tangent = at_arc(screen.curve_mm, foot + 0.5) - at_arc(screen.curve_mm, np.maximum(foot - 0.5, 0.0))
-        tangent /= np.linalg.norm(tangent, axis=1)[:, None]
-        across = np.cross(tangent, screen.normal) @ axes.T
+        across = np.cross(tangents(screen.curve_mm, foot, 0.5), screen.normal) @ axes.T
         gap = np.sum(((at_arc(screen.curve_mm, foot) - here) @ axes.T) * across, axis=1)
         step = np.linalg.solve(across.T @ across + ridge, across.T @ gap - ridge @ shift)
         shift = shift + step

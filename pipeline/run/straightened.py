@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.ndimage import map_coordinates
 
-from pipeline.arrays.polyline import at_arc
+from pipeline.arrays.polyline import at_arc, tangents
 from pipeline.model import Array, Volume, arc_length
 from reports.frames_file import Straightened
 
@@ -22,9 +22,9 @@ def straightened(volume: Volume, curve_mm: Array, window: tuple[float, float]) -
     across = STEP_VOXELS * float(np.min(volume.spacing_mm))
     along = max(across, length / MOST_PLANES)
     arc = np.arange(0.0, length, along)
-    tangents = _unit(at_arc(curve_mm, arc + _AHEAD_MM) - at_arc(curve_mm, np.maximum(arc - _AHEAD_MM, 0.0)))
-    first = _carried(tangents)
-    second = np.cross(tangents, first)
+    heading = tangents(curve_mm, arc, _AHEAD_MM)
+    first = _carried(heading)
+    second = np.cross(heading, first)
     offsets = across * (np.arange(ACROSS) - ACROSS // 2)
     # every plane's points: (planes, samples along the first direction, along the second, 3)
     planes = offsets[:, None, None] * first[:, None, None] + offsets[:, None] * second[:, None, None]

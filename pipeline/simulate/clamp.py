@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.arrays.polyline import angle_deg, at_arc
+from pipeline.arrays.polyline import angle_deg, at_arc, tangents
 from pipeline.model import Array, Clamp, Curve
 from pipeline.simulate.departures import departed
 from pipeline.simulate.evidence import TraceSamples, covariance_of, disagreeing, posterior
@@ -107,8 +107,7 @@ def _feet(trace: TraceSamples, curve: Array) -> tuple[Array, Array]:
     """The nearest points of a curve to a trace's points: arc lengths (n,), not below 0, and tangents (n, 3) there."""
     foot = trace.arc_mm
     for _ in range(3):
-        tangent = at_arc(curve, foot + TANGENT_MM) - at_arc(curve, np.maximum(foot - TANGENT_MM, 0.0))
-        tangent /= np.linalg.norm(tangent, axis=1)[:, None]
+        tangent = tangents(curve, foot, TANGENT_MM)
         foot = np.maximum(foot + np.sum((trace.points_mm - at_arc(curve, foot)) * tangent, axis=1), 0.0)
     return foot, tangent
 

@@ -16,9 +16,9 @@ from pipeline.trace.config import TraceConfig
 from pipeline.trace.elsewhere import brightest_line
 from pipeline.trace.explain import explained, hardly_begun, missed_mm
 from pipeline.trace.onward import GOES_ON
+from pipeline.trace.rotation_plane import near_rotation_plane
 from pipeline.trace.stated import Opacity
 from pipeline.trace.subtraction import subtracting
-from pipeline.trace.verdict import near_rotation_plane
 from pipeline.trace.whose_end import BEYOND_GAP, DIM_FROM_TIP, GAP, cleared
 
 __all__ = ["BEYOND_GAP", "DIM_FROM_TIP", "GAP", "GOES_ON", "cleared", "of_catheter", "of_length", "trace"]

@@ -1,14 +1,10 @@
-"""Is the curve right? What the grey along it says, what it leaves unexplained, and what the manifest expected.
-
-And where the wire runs so nearly in the plane in which the scanner turned that its scan is least to be trusted.
-"""
+"""Is the curve right? What the grey along it says, what it leaves unexplained, and what the manifest expected."""
 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from pipeline.arrays.polyline import at_arc
 from pipeline.model import Array, arc_length
 from pipeline.status import FrameStatus
 from pipeline.trace.attempt import Attempt, tube_length
@@ -25,6 +21,7 @@ from pipeline.trace.ends import (
 from pipeline.trace.link import extended, resampled
 from pipeline.trace.profile import LEAST_LEVEL, Steps
 from pipeline.trace.section import out_of_round, paired, read_around
+from pipeline.trace.strands import BESIDE_VOXELS, DOUBLE, doubled, of_one_strand
 from pipeline.trace.subtraction import CREST_VOXELS, Subtraction
 from pipeline.trace.tube import Tube
 
@@ -44,25 +41,12 @@ SURE_CNR = 5.0
 """Contrast over noise from which crests at the finest blur are enough."""
 FAINT = 0.35
 """Share of the usual crest grey below which there is no wire to be seen: a gap."""
-DOUBLE = 1.6
-"""Share of the usual crest grey above which two strands lie on one crest."""
 LEFTOVER_MM = 2.5
 """Length of crests that run elsewhere from which the curve may be the wrong one."""
 FAINT_LEFTOVER_MM = 4.0
 """The same (and a tenth of the curve) below SURE_CNR: crests are looked for lower there, and noise makes some."""
 MOST_FAINT_MM = 5.0
 """Length without a bright line that a curve may have if that is less than a quarter of it (a gap is 3 mm)."""
-MOST_DOUBLE = 2.6
-"""Share of the usual crest grey from which it is not two strands but a brighter wire."""
-IN_CONTACT = 0.035
-"""How far out of round (second harmonic over peak) two strands in contact are at the least; a round wire, with the wall
-beside it, is below 0.03."""
-ALONE = 0.15
-"""Least share of a line in which one strand lies alone: 5 mm of 35."""
-OBLONG = 0.12
-"""How far out of round a line of any brightness is that is no single wire; two that are two voxels apart have 0.2."""
-BESIDE_VOXELS = 2.2
-"""Two strands of one curve nearer than this share their crest."""
 MOST_DOUBLE_MM = 2.0
 """Length of line that may be two strands (a crossing is 1 mm) from which a frame alone does not decide."""
 MOST_OUTSIDE = 0.03
@@ -73,8 +57,6 @@ TIP_AHEAD = 0.4
 """Share of the usual crest grey beyond the tip from which the wire seems to go on."""
 MEAN_OVER_MM = 1.5
 """Length over which crest grey is averaged before it is called faint or double."""
-TANGENT_MM = 1.5
-"""Length over which the wire's direction is taken: a few voxels, so that noise does not turn it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,8 +156,8 @@ def judge(image: Subtraction, attempt: Attempt, points: Array, bridged: NDArray[
     oblong, doubtful = out_of_round(image, points, read)
     double = beside_itself(points, step, BESIDE_VOXELS * image.voxel)
     if not image.thick_slices:
-        alone = share / _of_one_strand(share, (ends > MEAN_OVER_MM) & ~bridged & ~faint)
-        double |= _doubled(alone, oblong, np.maximum(DOUBLE, 1.0 + 4.0 * noise), doubtful)
+        alone = share / of_one_strand(share, (ends > MEAN_OVER_MM) & ~bridged & ~faint)
+        double |= doubled(alone, oblong, np.maximum(DOUBLE, 1.0 + 4.0 * noise), doubtful)
     outside = _outside(image, points)
     faint_mm, double_mm = (float(np.count_nonzero(m)) * step for m in (faint & ~bridged, double))
     objections = of_the_way(attempt, length_mm)
@@ -188,25 +170,6 @@ def judge(image: Subtraction, attempt: Attempt, points: Array, bridged: NDArray[
     objections += of_the_whole(image, attempt, points, length_mm)
     first = next(((status, note_of(*why)) for holds, status, *why in objections if holds), (FrameStatus.OK, ""))
     return Verdict(*first, bridged | faint | double | outside, faint_mm, double_mm)
-
-
-def _of_one_strand(share: Array, seen: NDArray[np.bool_]) -> float:
-    """Height of one strand over that of most of the line: below 1 where two strands lie together nearly all along."""
-    return min(1.0, float(np.quantile(share[seen], ALONE))) if seen.any() else 1.0
-
-
-def _doubled(share: Array, oblong: Array, bright: Array, noise: float) -> NDArray[np.bool_]:
-    """Points (n,) where two strands may lie on one crest: not round, or too bright where noise hides the shape.
-
-    The closer two strands are, the brighter and the rounder is their crest; one that is over MOST_DOUBLE times as
-    bright is no two strands but a coil of platinum.
-    """
-    own = noise / np.maximum(share, 1.0)
-    least = np.where(share < MOST_DOUBLE, np.interp(share, [1.0, DOUBLE], [OBLONG, IN_CONTACT]), OBLONG)
-    hidden = (share > bright) & (share < MOST_DOUBLE) & (own > 0.25 * IN_CONTACT)
-    # in a line as bright as two, one standard deviation is enough: two in contact have 0.06, which three would hide
-    sure = np.where(share < MOST_DOUBLE, np.interp(share, [1.0, DOUBLE], [3.0, 1.0]), 3.0)
-    return np.asarray(hidden | (oblong > least + sure * own))
 
 
 def _of_the_line(
@@ -246,20 +209,3 @@ def _of_the_line(
          f"{double_mm:.1f} mm of line too bright or too wide for one strand", f"{MOST_DOUBLE_MM} mm at most",
          "list a frame of a smaller depth before it, whose curve tells strands apart, or look for a second wire"),
     )  # fmt: skip
-
-
-def near_rotation_plane(points_mm: Array, axis: ArrayLike, limit_deg: float) -> NDArray[np.bool_]:
-    """Points (n,) of a curve (n, 3) whose tangent is within ``limit_deg`` of the plane across ``axis`` (LPS).
-
-    A cone-beam scan on a circle lacks the frequencies within the cone's half angle of its axis (Tuy 1983, doi
-    10.1137/0143035), and those are what places such a stretch along the axis; rays that run along the metal there
-    leave streaks. Both happen below the cone's half angle: 7 to 9 degrees for a 30 x 40 cm detector at 1.2 m.
-    """
-    if len(points_mm) < 2:
-        return np.zeros(len(points_mm), bool)
-    normal = np.asarray(axis, float) / np.linalg.norm(np.asarray(axis, float))
-    arc = arc_length(points_mm)
-    ends = (np.clip(arc + sign * 0.5 * TANGENT_MM, 0.0, arc[-1]) for sign in (1, -1))
-    chord = np.subtract(*(at_arc(points_mm, s) for s in ends))
-    climb = np.abs(chord / (np.linalg.norm(chord, axis=1)[:, None] + 1e-12) @ normal)
-    return np.asarray(climb < np.sin(np.radians(limit_deg)))

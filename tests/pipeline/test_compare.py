@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from pipeline.arrays.polyline import at_arc, resample, samples, tip_tangent, to_length
+from pipeline.arrays.polyline import at_arc, resample, samples, tangents, tip_tangent, to_length
 from pipeline.compare import compare, compare_truth, point_to_curve, rms
 from pipeline.compare.branches import branches_of
 from pipeline.compare.config import CompareConfig
@@ -79,6 +79,15 @@ def test_a_curve_is_cut_or_continued_straight() -> None:
     np.testing.assert_allclose(to_length(curve, 9.0)[-1], [4.0, 5.0, 0.0])
     np.testing.assert_allclose(tip_tangent(curve), [0, 1, 0])
     assert arc_length(resample(curve, 0.1))[-1] == pytest.approx(7.0)
+
+
+def test_tangents_are_chords_about_a_point_and_nothing_for_a_point_alone() -> None:
+    curve = np.array([[0.0, 0, 0], [4.0, 0, 0], [4.0, 3.0, 0]])
+    diagonal = np.sqrt(0.5)
+    expected = [[1, 0, 0], [1, 0, 0], [diagonal, diagonal, 0], [0, 1, 0], [0, 1, 0]]
+    found = tangents(curve, np.array([0.0, 2.0, 4.0, 7.0, 9.0]), 0.5)
+    np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-12)
+    np.testing.assert_array_equal(tangents(curve[:1], np.zeros(1), 0.5), np.zeros((1, 3)))
 
 
 @pytest.mark.parametrize("rounding", [-1e-12, 1e-12])

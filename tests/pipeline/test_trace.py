@@ -22,8 +22,8 @@ from pipeline.trace import of_catheter, of_length, trace
 from pipeline.trace.config import TraceConfig
 from pipeline.trace.elsewhere import brightest_line
 from pipeline.trace.region import _regions
+from pipeline.trace.rotation_plane import near_rotation_plane
 from pipeline.trace.subtraction import BLOCK, _smooth, levelled, subtracted, subtracting
-from pipeline.trace.verdict import near_rotation_plane
 from solver.grid import Grid
 from tests.bench.imaging.topology import earlier, plain
 from tests.pipeline import phantoms, tangles
