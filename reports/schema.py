@@ -155,3 +155,5 @@ BENCH = Table("bench.csv")
 STRESS = Table("stress.csv")
 CLAIMS = Table("claims.csv")
 ORDERS = Table("orders.csv")
+OURS = "wireval"
+"""Name of this package's own wire among the simulators of these tables."""

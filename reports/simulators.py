@@ -12,9 +12,9 @@ from reports.case_files import copied_from_traces, counted, listed, not_reached,
 from reports.figures.simulators import SimulatorFiles, leads
 from reports.origin import why_not_pooled
 from reports.page import draw_sections, write_page
-from reports.schema import OVERALL_FILE, SIMULATORS, SUMMARY, WHERE, Column
+from reports.schema import OURS, OVERALL_FILE, SIMULATORS, SUMMARY, WHERE, Column
 from reports.tables import read_if_there
-from reports.verdict import COPIED, NEVER_NEAREST, OURS, badge, tips_off, verdict
+from reports.verdict import COPIED, NEVER_NEAREST, badge, tips_off, verdict
 
 PAGE = "simulators.html"
 _MOST_WARNINGS = 5

@@ -11,7 +11,7 @@ import pandas as pd
 from reports._content import NOTHING, fewer_frames, interval, number, predictor_label
 from reports.case_files import WORST, counted, doubted, results_in, said_by_cases
 from reports.records import read_json
-from reports.schema import SUMMARY
+from reports.schema import OURS, SUMMARY
 
 _MANY = 5
 _WIDE = "wide: "  # how the note on an interval over few insertions begins
@@ -36,8 +36,6 @@ def verdict(statistics: Mapping[str, Any], simulator: str = "") -> str:
     return " ".join(filter(None, (sentence, *remarks(statistics, simulator), _against(statistics))))
 
 
-OURS = "wireval"
-"""Name of this package's own wire among simulators."""
 WORSE = "worse than a guess"
 NO_BETTER, NOT_SHOWN = "no better than a guess", "not shown to be better than a guess"
 TOO_FEW = "too few insertions to tell"

@@ -25,10 +25,12 @@ def add_settings(parser: argparse.ArgumentParser) -> None:
     add("--set", action="append", default=[], dest="settings", metavar="TABLE.KEY=VALUE", help="one setting")
 
 
-def add_gates(parser: argparse.ArgumentParser, of: str = "overall.csv") -> None:
-    """--fail-if. of : which table is asked."""
+def add_gates(parser: argparse.ArgumentParser, of: str = "overall.csv", metavar: str = "COLUMN>VALUE") -> None:
+    """--fail-if and --junit. of : which table is asked."""
     says = f"exit 1 where a number of {of} is so, or missing; >, <, >= or <=; may be repeated"
-    parser.add_argument("--fail-if", action="append", default=[], metavar="COLUMN>VALUE", help=says)
+    parser.add_argument("--fail-if", action="append", default=[], metavar=metavar, help=says)
+    says = "write a JUnit summary, one test per frame and gate"
+    parser.add_argument("--junit", type=Path, metavar="FILE", help=says)
 
 
 def add_quiet(parser: argparse._ActionsContainer) -> None:

@@ -1,10 +1,11 @@
 """``wireval calibrate MANIFEST -o OUT``: parameters from the cases marked role = "calibration"."""
 
 import argparse
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pipeline.commands import add_settings, resolved_settings, say
+from pipeline.commands import add_quiet, add_settings, resolved_settings, say
 from pipeline.commands.given import file_of
 
 if TYPE_CHECKING:
@@ -30,6 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--design", action="store_true", help="predict from planned lumen, wire, depths and rolls; nothing is fitted")
     add("--no-cache", action="store_true", help="neither take lumens and traces of earlier runs nor keep them")
     add_settings(parser)
+    add_quiet(parser)
 
 
 def main(args: argparse.Namespace) -> int:
@@ -57,7 +59,7 @@ def _fit(args: argparse.Namespace, cases: "tuple[Case, ...]", config: "Config", 
     from pipeline.run.calibration_files import flattened, misfit, write_parameters, write_record
     from reports.calibration import gained, render_calibration
 
-    found = gathered(cases, config, store, say)
+    found = gathered(cases, config, store, (lambda _: None) if args.quiet else say)
     fit = calibrate(found, config)
     file = file_in(args.out)
     before = file.read_bytes() if file.exists() else b""
@@ -71,10 +73,9 @@ def _fit(args: argparse.Namespace, cases: "tuple[Case, ...]", config: "Config", 
         say(f"{one.name:20s} {one.used:10g}  +- {sd:8s}{verdict}")
     if said := gained([vars(frame) for frame in fit.frames]):
         say(said)
-    for warning in (*misfit(fit), *flattened(found)):
-        say(f"warning: {warning}")
-    for note in found.left_out:
-        say(note)
+    to = sys.stderr if args.quiet else sys.stdout
+    for line in (*(f"warning: {text}" for text in (*misfit(fit), *flattened(found))), *found.left_out):
+        print(line, file=to, flush=True)
     if before not in (b"", file.read_bytes()):
         say(f"{file}: that of a calibration before, which said otherwise, is replaced")
     seen = f"{len(written.estimate) - len(written.unseen)} of {len(written.estimate)} parameters seen"

@@ -47,7 +47,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--fresh", action="store_true", help="compute every case again")
     add("--dry-run", action="store_true", help="say what would be done, and do nothing")
     add("--sweep", action="append", default=[], metavar="TABLE.KEY=V1,V2", help="also run with each of these values")
-    add("--junit", type=Path, metavar="FILE", help="write a JUnit summary, one test per frame and gate")
     add_calibrated(parser)
     add_gates(parser)
     add("--embed", action="store_true", help="put the pictures into the pages: one file a page")
@@ -75,7 +74,7 @@ def _run(args: argparse.Namespace, gates: "Sequence[Gate]") -> int:
     plan = _plan(args)
     if not plan.cases:
         if args.junit and not args.dry_run:
-            write_tests(args.junit, (), {})  # a build server expects the file
+            write_tests(args.junit, {}, {})  # a build server expects the file
         say(_nothing(args.shard, plan))
         return 0
     plan = _sound(plan, args.skip_bad)
@@ -89,7 +88,7 @@ def _run(args: argparse.Namespace, gates: "Sequence[Gate]") -> int:
     judged = held(gates, plan.out, totals.pooled)
     closed = [why for why in judged.values() if why]
     if args.junit:
-        write_tests(args.junit, found_results(plan.out), judged)
+        write_tests(args.junit, {"": found_results(plan.out)}, judged)
     _tell(plan, totals, closed)
     say(last_line(totals, index))
     return 0 if totals.all_ok and not closed else 1

@@ -36,7 +36,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_settings(parser)
     add("-j", "--jobs", type=int, default=1, metavar="N", help="cases at once (default 1)")
     add_calibrated(parser)
-    add_gates(parser, of="the overall.csv of any simulator but the solver itself")
+    of = "the overall.csv of any simulator but the solver itself, or of the one that is named,"
+    add_gates(parser, of, metavar="[NAME:]COLUMN>VALUE")
     add("--fresh", action="store_true", help="compute every case again")
     add("--embed", action="store_true", help="put the pictures into the pages: one file a page")
     add_quiet(parser)
@@ -44,16 +45,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(args: argparse.Namespace) -> int:
     """Exit 0 all ok, 1 some case of any simulator failed or a gate closed; InputError where the input is wrong."""
+    from pipeline.run.aggregate import write_tests
     from pipeline.run.gate import gate, held
+    from pipeline.run.results import found_results
     from pipeline.run.simulators import side_by_side
     from pipeline.status import InputError
     from pipeline.study.check import check
+    from pipeline.study.others import named
     from reports.inside import misleading_links
-    from reports.schema import SIMULATORS, WHERE
+    from reports.schema import OURS, SIMULATORS, WHERE
     from reports.simulators import PAGE
-    from reports.verdict import OURS, warned
+    from reports.verdict import warned
 
-    gates = [gate(text) for text in args.fail_if]
+    gates = [gate(text, [*named(args.curves), OURS]) for text in args.fail_if]
     plans = _plans(args)
     found = {name: check(plan.cases, plan.template.settings.config) for name, plan in plans.items()}
     theirs = [f"{name}: {text}" for name, of in found.items() for text in of if text not in found[OURS]]
@@ -70,9 +74,15 @@ def main(args: argparse.Namespace) -> int:
     sys.stderr.writelines(f"{line}\n" for line in warnings if args.quiet)
     for line in side_by_side(args.out, {name: plan.out for name, plan in plans.items()}, args.embed):
         say(line)
-    judged = {name: held(gates, plans[name].out, totals[name].pooled) for name in totals if name != OURS}
-    closed = [f"{name}: {why}" for name, whys in judged.items() for why in whys.values() if why]
+    judged = {
+        f"{name}: {asked}": f"{name}: {why}" * bool(why)
+        for name, plan in plans.items()
+        for asked, why in held(gates, plan.out, totals[name].pooled, name).items()
+    }
+    closed = [why for why in judged.values() if why]
     sys.stderr.writelines(f"{line}\n" for line in closed)
+    if args.junit:
+        write_tests(args.junit, {f"{name}/": found_results(plan.out) for name, plan in plans.items()}, judged)
     return 0 if all(one.all_ok for one in totals.values()) and not closed else 1
 
 
@@ -80,7 +90,8 @@ def _judged(plans: "Mapping[str, Plan]", quiet: bool) -> "dict[str, Totals]":
     """Run every simulator's plan, and say what became of it."""
     from pipeline.run.last_words import failure_lines, last_line
     from pipeline.run.launch import launch
-    from reports.verdict import OURS, remarks
+    from reports.schema import OURS
+    from reports.verdict import remarks
 
     done = {}
     for number, (name, plan) in enumerate(plans.items(), start=1):
@@ -112,8 +123,8 @@ def _plans(args: argparse.Namespace) -> "dict[str, Plan]":
     from pipeline.status import UsageError
     from pipeline.study.manifest import Manifest, read_manifest
     from pipeline.study.others import Others, found_for, named
+    from reports.schema import OURS
     from reports.simulators import folders_in
-    from reports.verdict import OURS
 
     manifest, settings = read_manifest(file_of(args.manifest)), resolved_settings(args)
     if args.jobs < 1:

@@ -123,12 +123,17 @@ def _times(out: Path, found: Sequence[Result]) -> tuple[pd.DataFrame, float]:
     return pd.concat(parts, ignore_index=True) if parts else tables.read_if_there(None, TIMINGS), replayed_s
 
 
-def write_tests(path: Path, found: Sequence[Result], gates: Mapping[str, str]) -> None:
+def write_tests(path: Path, found: Mapping[str, Sequence[Result]], gates: Mapping[str, str]) -> None:
     """Write a JUnit summary: a suite per case, a test per frame (one test for a case without frames), a suite of gates.
 
-    gates : each condition that was asked for, and why it failed, empty where it passed.
+    found : the cases by what their suites' names begin with.     gates : each condition that was asked for, and why it
+    failed, empty where it passed.
     """
-    suites = [(result.case, [_outcome(frame) for frame in result.frames or [_whole(result)]]) for result in found]
+    suites = [
+        (f"{whose}{result.case}", [_outcome(frame) for frame in result.frames or [_whole(result)]])
+        for whose, results in found.items()
+        for result in results
+    ]
     if gates:
         suites.append(("gates", [Outcome(n, "failed" if why else "passed", why, "gate") for n, why in gates.items()]))
     write_junit(path, "wireval", suites)

@@ -9,29 +9,40 @@ from pathlib import Path
 from typing import Any
 
 from pipeline.status import UsageError, did_you_mean
-from reports.schema import OVERALL_FILE, SUMMARY
+from reports.schema import OURS, OVERALL_FILE, SUMMARY
 
 RELATIONS = {"<=": operator.le, ">=": operator.ge, "<": operator.lt, ">": operator.gt}
 NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
 """As people write one: Python also takes 1_0 for 10, and digits of other scripts."""
-WRITTEN = re.compile(rf"\s*(\w+)\s*({'|'.join(RELATIONS)})\s*({NUMBER})\s*")
+WRITTEN = re.compile(rf"\s*(?:([\w.-]+):)?\s*(\w+)\s*({'|'.join(RELATIONS)})\s*({NUMBER})\s*")
 
 
 @dataclass(frozen=True)
 class Gate:
-    """A condition on a column of overall.csv; the gate closes where it holds, or where the column has no value."""
+    """A condition on a column of overall.csv; the gate closes where it holds, or where the column has no value.
+
+    of : the one simulator of a score whose wires are asked; empty for each but the solver.
+    """
 
     column: str
     relation: str
     limit: float
+    of: str = ""
 
     @property
     def asked(self) -> str:
         """The option as it was typed."""
-        return f"--fail-if {self.column}{self.relation}{self.limit:g}"
+        return f"--fail-if {self.of}{':' * bool(self.of)}{self.column}{self.relation}{self.limit:g}"
+
+    def asks(self, simulator: str) -> bool:
+        """Whether this simulator's wires are asked; without a name they are the run's only ones."""
+        return simulator == self.of if self.of else simulator != OURS
 
     def closed(self, overall: Mapping[str, Any]) -> str:
         """Why a run with this row of overall.csv must not pass; empty where it may."""
+        if not overall:
+            why = f"{OVERALL_FILE} has no row, as no case was scored; it cannot be shown to hold"
+            return f"gate closed: {self.asked}: {why}"
         found = overall.get(self.column)
         value = float("nan") if found is None else float(found)
         if math.isnan(value):
@@ -43,21 +54,26 @@ class Gate:
         return "" if passed else f"gate closed: {self.asked}: {self.column} is {value:.4g}"
 
 
-def held(gates: Sequence[Gate], out: Path, overall: Mapping[str, Any]) -> dict[str, str]:
+def held(gates: Sequence[Gate], out: Path, overall: Mapping[str, Any], simulator: str = "") -> dict[str, str]:
     """By what was asked, why a run must not pass, empty where it may.
 
     Errors of wires that were made from the traces open no gate. overall : the row of the run into ``out``.
+    simulator : whose wires they are, in a score.
     """
     from reports.case_files import copied_from_traces, warnings_in  # half a second, for a gate that may be refused
 
-    copied = copied_from_traces(warnings_in(out)) if gates else ""  # reads the results of all cases
-    return {g.asked: f"gate closed: {g.asked}: {copied}" if copied else g.closed(overall) for g in gates}
+    asked = [gate for gate in gates if gate.asks(simulator)]
+    copied = copied_from_traces(warnings_in(out)) if asked else ""  # reads the results of all cases
+    return {g.asked: f"gate closed: {g.asked}: {copied}" if copied else g.closed(overall) for g in asked}
 
 
-def gate(text: str) -> Gate:
-    """Parse ``column>number``; UsageError where it is malformed, or where the column is no number of overall.csv."""
+def gate(text: str, simulators: Sequence[str] = ()) -> Gate:
+    """Parse ``column>number``; UsageError where it is malformed, or where the column is no number of overall.csv.
+
+    simulators : those of a score, one of which may be named before it: ``mine:column>number``.
+    """
     found = WRITTEN.fullmatch(text)
-    column, relation, limit = found.groups() if found else ("", "", "nan")
+    name, column, relation, limit = found.groups() if found else ("", "", "", "nan")
     number = float(limit)
     if not math.isfinite(number):
         do = f'write a column of {OVERALL_FILE} and a limit in plain digits, as in "rms_mm>0.5" or "rms_mm>5e-1"'
@@ -65,4 +81,7 @@ def gate(text: str) -> Gate:
     names = [one.name for one in SUMMARY if one.kind != "text"]
     if column not in names:
         raise UsageError([f"--fail-if {text!r}: no number {column!r} in {OVERALL_FILE}; {did_you_mean(column, names)}"])
-    return Gate(column, relation, number)
+    if name and name not in simulators:
+        known = did_you_mean(name, simulators) if simulators else "only score has several; write the condition alone"
+        raise UsageError([f"--fail-if {text!r}: no simulator {name!r}; {known}"])
+    return Gate(column, relation, number, name or "")

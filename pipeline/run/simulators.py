@@ -20,9 +20,9 @@ from reports import tables
 from reports.case_files import copied_from_traces, listed, warnings_in
 from reports.html import render_index
 from reports.origin import why_not_pooled
-from reports.schema import FAILURES, POINTS, SIMULATORS, WHERE
+from reports.schema import FAILURES, OURS, POINTS, SIMULATORS, WHERE
 from reports.simulators import in_common, render_simulators
-from reports.verdict import COPIED, OURS, TIPS_OFF, tips_off
+from reports.verdict import COPIED, TIPS_OFF, tips_off
 
 STEPS_MM = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
 MOST_BINS = 12

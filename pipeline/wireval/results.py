@@ -18,7 +18,6 @@ from reports.case_files import CaseFiles, amiss, find_cases, listed, not_run, re
 from reports.origin import why_not_pooled
 from reports.schema import ERRORS, FAILURES, OVERALL_FILE, POINTS, SIMULATORS, SUMMARY, SWEEP, WHERE, Table
 from reports.simulators import folders_in
-from reports.verdict import OURS
 
 _SHOWN = ["case", "status", "frames", "frames_ok", "rms_mm", "tip_median_mm", "skill_strongest", "strongest_null"]
 
@@ -150,10 +149,12 @@ def read_run(out: Path, gates: Sequence[str] = ()) -> Results:
 
 def with_gates(found: Results, gates: Sequence[str]) -> Results:
     """The results with a sentence for each ``fail_if`` that holds: of a score, of every simulator but the solver."""
-    others = {name: folder for name, folder in folders_in(found.out).items() if name != OURS}
-    asked = [gate(text) for text in gates]
-    own = {f"{name}: ": folder for name, folder in others.items()} or {"": found.out}
-    judged = {whose: held(asked, folder, _pooled(folder)) for whose, folder in own.items()}
+    simulators = folders_in(found.out)
+    asked = [gate(text, [*simulators]) for text in gates]
+    judged = {
+        f"{name}: " if name else "": held(asked, folder, _pooled(folder), name)
+        for name, folder in (simulators or {"": found.out}).items()
+    }
     return replace(found, closed=tuple(f"{whose}{why}" for whose, own in judged.items() for why in own.values() if why))
 
 

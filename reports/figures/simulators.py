@@ -11,7 +11,8 @@ from matplotlib.colors import to_hex, to_rgb
 from reports.colours import SIMULATED
 from reports.figures._drawing import Drawing, legend, new_figure, plain, positive_axis
 from reports.figures._style import PALETTE
-from reports.verdict import NEVER_NEAREST, OURS
+from reports.schema import OURS
+from reports.verdict import NEVER_NEAREST
 
 _FAINT = 0.3  # of a lead that is not clear
 _SHADES = ((0.0, 1.0), (0.0, 0.5), (0.5, 0.5))  # white that is added, share of the colour that is kept

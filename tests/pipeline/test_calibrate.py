@@ -381,6 +381,11 @@ def test_the_verb_writes_what_it_reads(study, capsys):
     assert "calibrated with a: 0 of 6 parameters seen.  parameters: " in said.splitlines()[-1]
     for one in found.estimate:
         assert f"{one.name:20s} {one.used:10g}  +-" in said, "the number that runs take, not one of another fit"
+    assert main(["calibrate", str(study / "manifest.toml"), "-o", str(study / "out"), "--no-cache", "-q"]) == 0
+    quiet = capsys.readouterr().out.splitlines()
+    told = [line for line in said.splitlines() if not line.startswith(("a: ", "warning"))]
+    assert quiet[:-1] == told[:-1], "neither progress nor warnings"
+    assert "parameters seen" in quiet[-1]
     page = (study / "out" / "calibration.html").read_text(encoding="utf-8")
     assert "not seen" in page
     lines = (study / "out" / "figures" / "profiles.csv").read_text(encoding="utf-8").splitlines()

@@ -78,6 +78,8 @@ TOO_LONG = (
         ("init STUDY/reference.mha", "this is a file; give a folder that holds scans"),
         ("RUN STUDY -o y", "did you mean 'run'?"),
         ("run STUDY -o y --fail-if RMS_MM>1", "did you mean 'rms_mm'?"),
+        ("run STUDY -o y --fail-if mine:rms_mm>1", "no simulator 'mine'; only score has several"),
+        ("score STUDY -o y --curves mine=. --fail-if min:rms_mm>1", "no simulator 'min'; did you mean 'mine'?"),
         ("init STUDY --to /proc/none/m.toml", "cannot be written"),
         ("init STUDY --to y --entry 900,0,0 --direction 0,0,1", "lies outside the scan"),
         ("init STUDY --to y --wire-radius -1", "radius_mm"),
@@ -291,6 +293,7 @@ def test_a_gate_closes_on_the_limit_s_far_side_and_on_nothing_to_go_by() -> None
     assert gate("frames_ok<3").closed({"frames_ok": 2})
     withheld = {"rms_low_mm": float("nan"), "interval": "interval withheld: 1 insertion, at least 3 needed"}
     assert "no rms_low_mm: interval withheld: 1 insertion" in gate("rms_low_mm>0.5").closed(withheld)
+    assert "no case was scored" in gate("rms_mm>0.5").closed({})
     for nothing in ({}, {"rms_mm": None}, {"rms_mm": float("nan")}):
         assert "cannot be shown" in gate("rms_mm>0.5").closed(nothing)
 

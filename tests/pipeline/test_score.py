@@ -9,6 +9,7 @@ import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import cast
+from xml.etree import ElementTree
 
 import h5py
 import numpy as np
@@ -131,6 +132,18 @@ def test_a_third_party_in_a_bifurcation(tmp_path: Path, capsys: pytest.CaptureFi
     capsys.readouterr()
     assert main([*words, "--fail-if", "rms_mm>0.001", "--fail-if", "frames_failed>0"]) == 1
     assert "PyElastica: gate closed: --fail-if rms_mm>0.001" in capsys.readouterr().err
+    of_one, tests = ["--fail-if", "wireval:rms_mm>0.002", "--fail-if", "PyElastica:rms_mm>5"], tmp_path / "tests.xml"
+    assert main([*words, *of_one, "--junit", str(tests)]) == 1
+    heard = capsys.readouterr().err
+    assert "wireval: gate closed: --fail-if wireval:rms_mm>0.002" in heard
+    assert heard.count("gate closed") == 1, "the other simulator is held against its own limit alone"
+    suites = {suite.get("name"): suite for suite in ElementTree.parse(tests).getroot()}
+    assert list(suites) == ["PyElastica/bifurcation", "wireval/bifurcation", "gates"]
+    assert [suite.get("failures") for suite in suites.values()] == ["0", "0", "1"]
+    assert [case.get("name") for case in suites["gates"]] == [
+        "PyElastica: --fail-if PyElastica:rms_mm>5",
+        "wireval: --fail-if wireval:rms_mm>0.002",
+    ]
     table = pd.read_csv(out / "simulators.csv").set_index(["simulator", "against"])
     assert 0.8 < table.loc[("PyElastica", "wireval"), "rms_ratio"] < 1.5
     assert errors_of(out, "bifurcation")["branch_ok"].all()

@@ -25,8 +25,8 @@ from reports.figures.simulators import _nearest, unbroken
 from reports.figures.simulators import colours as colours_of
 from reports.frames_file import FrameArrays, ScanCrop, frame_numbers, read_frame, read_scan, write_frames
 from reports.page import draw_sections
-from reports.schema import BUDGET, ENTRIES, ERRORS, POINTS, SUMMARY, SWEEP, TIMINGS
-from reports.verdict import NEVER_NEAREST, OURS
+from reports.schema import BUDGET, ENTRIES, ERRORS, OURS, POINTS, SUMMARY, SWEEP, TIMINGS
+from reports.verdict import NEVER_NEAREST
 from tests.reports.fake_results import FakeCase, write_run
 
 CASE_FIGURES = figures_of("case")

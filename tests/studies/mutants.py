@@ -100,7 +100,8 @@ def mutants_of(path: Path) -> Iterator[Mutant]:
 def tests_of(file: str) -> list[str]:
     """For a line that no coverage sees, a kernel's: files that name the module or what is around it, nearest first.
 
-    A test names what its helpers name: those beside it that it imports.
+    A test names what its helpers name: those beside it that it imports. A file that is called as the module is comes
+    first: of a dozen that share a helper it is the one that was written for it.
     """
     module = file.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
     found: list[str] = []
@@ -115,7 +116,8 @@ def tests_of(file: str) -> list[str]:
         tests = dict.fromkeys(str(p) for p in named if p.name.startswith("test_"))
         found += [name for name in tests if name not in found]
         module = module.rpartition(".")[0]
-    return found or [f"tests/{module}"]
+    own = [str(p) for p in texts if p.stem == f"test_{Path(file).stem}"]
+    return [*own, *(name for name in found if name not in own)] or [f"tests/{module}"]
 
 
 def _naming(module: str, texts: Mapping[Path, str]) -> Iterator[Path]:
