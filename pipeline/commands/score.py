@@ -12,6 +12,7 @@ from pipeline.commands.given import add_calibrated, file_of
 
 if TYPE_CHECKING:
     from pipeline.run.aggregate import Totals
+    from pipeline.run.gate import Gate
     from pipeline.run.launch import Plan
 
 HELP = "judge other simulators' wires by the same pipeline, side by side with the solver's own"
@@ -45,9 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(args: argparse.Namespace) -> int:
     """Exit 0 all ok, 1 some case of any simulator failed or a gate closed; InputError where the input is wrong."""
-    from pipeline.run.aggregate import write_tests
-    from pipeline.run.gate import gate, held
-    from pipeline.run.results import found_results
+    from pipeline.run.gate import gate
     from pipeline.run.simulators import side_by_side
     from pipeline.status import InputError
     from pipeline.study.check import check
@@ -74,16 +73,27 @@ def main(args: argparse.Namespace) -> int:
     sys.stderr.writelines(f"{line}\n" for line in warnings if args.quiet)
     for line in side_by_side(args.out, {name: plan.out for name, plan in plans.items()}, args.embed):
         say(line)
+    closed = _closed(gates, plans, totals, args.junit)
+    sys.stderr.writelines(f"{line}\n" for line in closed)
+    return 0 if all(one.all_ok for one in totals.values()) and not closed else 1
+
+
+def _closed(
+    gates: "Sequence[Gate]", plans: "Mapping[str, Plan]", totals: "Mapping[str, Totals]", junit: Path | None
+) -> list[str]:
+    """Why simulators must not pass, told in the JUnit summary, too, where one is asked for."""
+    from pipeline.run.aggregate import write_tests
+    from pipeline.run.gate import held
+    from pipeline.run.results import found_results
+
     judged = {
         f"{name}: {asked}": f"{name}: {why}" * bool(why)
         for name, plan in plans.items()
         for asked, why in held(gates, plan.out, totals[name].pooled, name).items()
     }
-    closed = [why for why in judged.values() if why]
-    sys.stderr.writelines(f"{line}\n" for line in closed)
-    if args.junit:
-        write_tests(args.junit, {f"{name}/": found_results(plan.out) for name, plan in plans.items()}, judged)
-    return 0 if all(one.all_ok for one in totals.values()) and not closed else 1
+    if junit:
+        write_tests(junit, {f"{name}/": found_results(plan.out) for name, plan in plans.items()}, judged)
+    return [why for why in judged.values() if why]
 
 
 def _judged(plans: "Mapping[str, Plan]", quiet: bool) -> "dict[str, Totals]":
