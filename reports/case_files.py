@@ -121,8 +121,8 @@ def results_in(out_dir: Path) -> dict[str, dict[str, Any]]:
     return found
 
 
-DOUBTS = "doubts.json"
-"""What ``wireval report`` found doubtful among all cases of a folder: shards have not seen each other's."""
+AMONG = "doubts.json"
+"""What is assumed and doubted of the cases of a folder among themselves; each run and ``wireval report`` look again."""
 _NUMBER = re.compile(r"[0-9]+(?:\.[0-9]+)?(?:e-?[0-9]+)?")
 MADE_FROM_TRACES = "only wires that were made from the traces"
 """What a warning of wires that lie nearer to the traces than these are known says; their errors are none."""
@@ -237,9 +237,18 @@ def not_reached(out_dir: Path) -> str:
 
 
 def doubted(out_dir: Path) -> list[str]:
-    """What the runs into a folder found doubtful among their cases, and ``report`` among all, each sentence once."""
-    told = [*runs_in(out_dir), read_json(out_dir / DOUBTS)]
-    return list(dict.fromkeys(str(text) for run in told for text in run.get("doubts", ())))
+    """What is doubtful of the runs into a folder, and of its cases among themselves, each sentence once."""
+    return _told(out_dir, "doubts")
+
+
+def assumed(out_dir: Path) -> list[str]:
+    """What the runs into a folder assumed, and what is assumed of its cases among themselves, each sentence once."""
+    return _told(out_dir, "assumptions")
+
+
+def _told(out_dir: Path, key: str) -> list[str]:
+    told = [*runs_in(out_dir), read_json(out_dir / AMONG)]
+    return list(dict.fromkeys(str(text) for run in told for text in run.get(key, ())))
 
 
 def runs_in(out_dir: Path) -> list[dict[str, Any]]:

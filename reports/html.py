@@ -14,6 +14,7 @@ from reports.case_files import (
     GOOD,
     CaseFiles,
     amiss,
+    assumed,
     counted,
     doubted,
     find_cases,
@@ -118,7 +119,7 @@ def render_index(out_dir: Path, embed: bool = False, each: Each = one_by_one) ->
         "failures": alike(failures),
         "beside_others": (out_dir / SIMULATORS.file).exists(),
         **_not_counted(out_dir),
-        "assumptions": [text for run in infos for text in run.get("assumptions", ())],
+        "assumptions": assumed(out_dir),
         "warnings": [*doubted(out_dir), *said_by_cases({case.name: case.result for case in cases}, "warnings")],
         "numbers": _content.in_tiles(_content.overall(declared("overall"), whole)),
         # the first stands beside the tiles: not the map of hundreds of cases, which is taller than a screen

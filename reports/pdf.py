@@ -14,6 +14,7 @@ from reports.atomic import replacing
 from reports.case_files import (
     WORST,
     CaseFiles,
+    assumed,
     counted,
     not_reached,
     not_run_sentence,
@@ -59,7 +60,7 @@ def _pages(out_dir: Path, summary: pd.DataFrame) -> Iterator[Page]:
     here = max(1, page.most(drawn))
     page.pictures(drawn[:here])
     yield page
-    yield _over_all(out_dir, run, drawn[here:], case)
+    yield _over_all(out_dir, drawn[here:], case)
     yield _worst_case(summary, case)
     yield _last(case, summary, run)
 
@@ -108,17 +109,17 @@ def _failures(page: Page, failures: pd.DataFrame, out_dir: Path) -> None:
     page.text(f"Next: see to what the messages name, then {command}", width=WIDE * 9 // 10, weight="bold")
 
 
-def _over_all(out_dir: Path, run: Mapping[str, Any], drawn: Sequence[Figured], worst: CaseFiles) -> Page:
+def _over_all(out_dir: Path, drawn: Sequence[Figured], worst: CaseFiles) -> Page:
     """Figures over all cases, and what was assumed: as much as the figures leave, which are not shrunk for it.
 
     Where that leaves room, as in a run of one case, there is more of the worst case.
     """
-    assumed = [*map(str, run.get("assumptions", ())), *said_by_cases(results_in(out_dir), "assumptions")]
+    assumptions = [*assumed(out_dir), *said_by_cases(results_in(out_dir), "assumptions")]
     page = Page("Over all cases")
-    needed = page.height(assumed)
+    needed = page.height(assumptions)
     drawn = drawn[: page.most(drawn, min(needed, _FOR_ASSUMPTIONS))]
     page.pictures(drawn, min(needed, page.left(drawn)))
-    page.some("Assumptions", assumed, "on the pages")
+    page.some("Assumptions", assumptions, "on the pages")
     more = _drawn("case", worst, _MORE_OF_WORST)
     page.pictures([one._replace(title=f"{worst.name}: {one.title}") for one in more[: page.most(more)]])
     return page

@@ -18,7 +18,7 @@ from pipeline.run.kin import told_of_kin
 from pipeline.run.overall import Found, found_cases, frames_of, overall, shared_scans, strangers, validation
 from pipeline.run.results import Result, write_json
 from reports import tables
-from reports.case_files import DOUBTS, GOOD, doubted, not_reached
+from reports.case_files import AMONG, GOOD, doubted, not_reached
 from reports.junit import Outcome, write_junit
 from reports.origin import why_not_pooled
 from reports.schema import FAILURES, OVERALL_FILE, SUMMARY, TIMINGS
@@ -57,10 +57,10 @@ def aggregate(out: Path, run_info: dict[str, Any] | None = None, name: str = "ru
     """Write the tables over all cases found, and ``name`` where ``run_info`` is given."""
     cases, mixed = found_cases(out), why_not_pooled(out)
     found, among = [case.result for case in cases], [] if mixed else with_another(out, cases)
-    whole, (assumed, seen) = overall(among), _seen_among(out, among)
-    doubts = _with_those_of_runs(out, seen) if run_info is None else [*run_info.get("doubts", ()), *seen]
+    whole = overall(among)
+    _keep_what_is_seen(out, found, among)
     if whole:
-        whole["warnings"] += len(doubts) + len(remarks(whole))
+        whole["warnings"] += len(doubted(out)) + len(remarks(whole))
     rows, (times, replayed_s) = [result.summary for result in found], _times(out, found)
     failures = [row for result in found for row in result.failures]
     for file, table, given in (
@@ -73,9 +73,7 @@ def aggregate(out: Path, run_info: dict[str, Any] | None = None, name: str = "ru
         tables.write(out / file, table, known)
     tables.write(out / TIMINGS.file, TIMINGS, times)
     if run_info is not None:
-        assumed = [*run_info.get("assumptions", ()), *shared_scans(found), *assumed]
-        cases_of = {"assumptions": assumed, "doubts": doubts, "cases": [result.case for result in found]}
-        write_json(out / name, run_info | cases_of | {"overall": whole})
+        write_json(out / name, run_info | {"cases": [result.case for result in found], "overall": whole})
     pooled = [] if mixed else frames_of(validation(cases))
     points = np.concatenate([np.zeros(0), *(frame.error_mm for frame in pooled)])
     return Totals(
@@ -93,20 +91,18 @@ def aggregate(out: Path, run_info: dict[str, Any] | None = None, name: str = "ru
     )
 
 
-def _seen_among(out: Path, among: Sequence[Found]) -> tuple[list[str], list[str]]:
-    """What is assumed of the cases, and what is doubtful of them, that none of them tells alone."""
+def _keep_what_is_seen(out: Path, found: Sequence[Result], among: Sequence[Found]) -> None:
+    """Write what is assumed and doubted of the cases that none of them tells alone.
+
+    Anew each time, apart from what runs say of themselves: a shard has not seen the cases of the others.
+    """
     scored = validation(among)
     placed, alike = told_of_kin(out, scored)
-    return [*placed, *strangers([case.result for case in among])], [*copies(scored), *alike, *exchanged(out, scored)]
-
-
-def _with_those_of_runs(out: Path, seen: Sequence[str]) -> list[str]:
-    """What runs have doubted, and what is seen among all cases: what no shard could see stands in a file of its own."""
-    (out / DOUBTS).unlink(missing_ok=True)
-    said = doubted(out)
-    if unsaid := [text for text in seen if text not in said]:
-        write_json(out / DOUBTS, {"doubts": unsaid})
-    return [*said, *unsaid]
+    assumed = [*shared_scans(found), *placed, *strangers([case.result for case in among])]
+    doubts = [*copies(scored), *alike, *exchanged(out, scored)]
+    (out / AMONG).unlink(missing_ok=True)
+    if assumed or doubts:
+        write_json(out / AMONG, {"assumptions": assumed, "doubts": doubts})
 
 
 def _times(out: Path, found: Sequence[Result]) -> tuple[pd.DataFrame, float]:

@@ -36,12 +36,12 @@ from pipeline.study.manifest import Case, Manifest
 from pipeline.study.same_scans import continued
 from pipeline.study.settings import to_toml
 from reports.atomic import WriteError, remove_leftovers, write_text, writing
-from reports.case_files import DOUBTS, counted, left_over, provenance_of
+from reports.case_files import AMONG, counted, left_over, provenance_of
 from reports.html import render_index
 from reports.records import read_json
 from reports.schema import FAILURES, OVERALL_FILE, SUMMARY, SWEEP, TIMINGS
 
-OVER_ALL = SUMMARY.file, OVERALL_FILE, FAILURES.file, TIMINGS.file, SWEEP.file, DOUBTS, "index.html", "summary.pdf"
+OVER_ALL = SUMMARY.file, OVERALL_FILE, FAILURES.file, TIMINGS.file, SWEEP.file, AMONG, "index.html", "summary.pdf"
 """Files over all cases. They go before the first case is computed: a run that is ended would leave those of an earlier
 one, all ok, beside cases of its own."""
 

@@ -331,6 +331,25 @@ def test_what_is_doubtful_among_cases_of_several_shards_is_found_by_report(
     assert int(pd.read_csv(out / "overall.csv")["warnings"].item()) == apart + len(doubted(out))
 
 
+def test_what_a_shard_saw_among_its_cases_alone_is_not_said_of_all(
+    study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of twelve cases in four shards "count as 3", "6", "9" and "12" stood beside each other: 17 warnings for 13."""
+    monkeypatch.setattr(aggregate, "copies", lambda scored: [f"they count as {len(scored)}"])
+    out, whole = tmp_path / "out", tmp_path / "whole"
+    for shard in ("1/2", "2/2"):
+        main(["run", str(study), "-o", str(out), "--until", "compare", "-q", "--shard", shard])
+    assert doubted(out) == ["they count as 2"], "the second shard saw the first one's case"
+    for shard in ("1/2", "2/2"):
+        main(["run", str(study), "-o", str(tmp_path / shard[0]), "--until", "compare", "-q", "--shard", shard])
+        shutil.copytree(tmp_path / shard[0], out, dirs_exist_ok=True)
+    assert doubted(out) == ["they count as 1"]
+    main(["report", str(out), "--overview"])
+    main(["run", str(study), "-o", str(whole), "--until", "compare", "-q"])
+    assert doubted(out) == doubted(whole) == ["they count as 2"]
+    assert (out / "overall.csv").read_bytes() == (whole / "overall.csv").read_bytes()
+
+
 def test_the_command_that_the_tool_names_next_is_pooled(study: Path, tmp_path: Path) -> None:
     """A case that failed was mended in the manifest and run alone; the shards of before still stated the old one."""
     out = tmp_path / "out"
