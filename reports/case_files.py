@@ -1,6 +1,5 @@
 """The folder of one case, read: result.json, errors.csv, points.csv.gz, frames.h5. Any of them may be missing."""
 
-import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -91,25 +90,6 @@ def read_case(folder: Path, points: bool = True, rest: bool = True) -> CaseFiles
     return CaseFiles(folder, read_json(folder / "result.json"), errors, samples, timings, scan, numbers)
 
 
-def warnings_of(folder: Path) -> list[str]:
-    """What a case was warned of; nothing of one whose result cannot be read, which is said elsewhere."""
-    try:
-        return list(read_json(folder / "result.json").get("warnings", ()))
-    except ValueError:
-        return []
-
-
-def warnings_in(out_dir: Path) -> dict[str, list[str]]:
-    """What each case below an output folder was warned of."""
-    return {case.name: warnings_of(case) for case in find_cases(out_dir)}
-
-
-def copied_from_traces(warnings: Mapping[str, Sequence[str]]) -> str:
-    """The warning that simulated wires were made from the traces; empty where no case has it. warnings : by case."""
-    said = (f"{case}: {text}" for case, texts in warnings.items() for text in texts)
-    return next((text for text in said if MADE_FROM_TRACES in text), "")
-
-
 def results_in(out_dir: Path) -> dict[str, dict[str, Any]]:
     """result.json of every case, empty where there is none, or one that cannot be read, which is said elsewhere."""
     found: dict[str, dict[str, Any]] = {}
@@ -119,33 +99,6 @@ def results_in(out_dir: Path) -> dict[str, dict[str, Any]]:
         except ValueError:
             found[folder.name] = {}
     return found
-
-
-AMONG = "doubts.json"
-"""What is assumed and doubted of the cases of a folder among themselves; each run and ``wireval report`` look again."""
-_NUMBER = re.compile(r"[0-9]+(?:\.[0-9]+)?(?:e-?[0-9]+)?")
-MADE_FROM_TRACES = "only wires that were made from the traces"
-"""What a warning of wires that lie nearer to the traces than these are known says; their errors are none."""
-
-
-def said_by_cases(results: Mapping[str, Mapping[str, Any]], key: str) -> list[str]:
-    """What the cases of a run say under ``warnings`` or ``assumptions``, a line each, with the cases that say it.
-
-    What differs in its numbers alone is one line, that of the first case. results : result.json by case.
-    """
-    if len(results) == 1:
-        return [str(text) for result in results.values() for text in result.get(key, ())]
-    said: dict[str, dict[str, list[str]]] = {}
-    for case, result in results.items():
-        for text in map(str, result.get(key, ())):
-            said.setdefault(_NUMBER.sub("#", text), {}).setdefault(text, []).append(case)
-    lines = []
-    for texts in said.values():
-        cases = dict.fromkeys(case for named in texts.values() for case in named)
-        others = len(texts) - 1
-        more = f" ({others} more with other numbers, on the pages of the cases)" * (others > 0)
-        lines.append(f"{listed([*cases])}: {next(iter(texts))}{more}")
-    return lines
 
 
 def find_cases(out_dir: Path) -> list[Path]:
@@ -234,21 +187,6 @@ def not_reached(out_dir: Path) -> str:
     ends = [str(run.get("until", "")) for run in runs_in(out_dir)]
     early = bool(ends) and all(end in ("load", "segment", "trace", "simulate") for end in ends)
     return f"Nothing is scored: the run was to end before frames are compared (--until {ends[0]})." if early else ""
-
-
-def doubted(out_dir: Path) -> list[str]:
-    """What is doubtful of the runs into a folder, and of its cases among themselves, each sentence once."""
-    return _told(out_dir, "doubts")
-
-
-def assumed(out_dir: Path) -> list[str]:
-    """What the runs into a folder assumed, and what is assumed of its cases among themselves, each sentence once."""
-    return _told(out_dir, "assumptions")
-
-
-def _told(out_dir: Path, key: str) -> list[str]:
-    told = [*runs_in(out_dir), read_json(out_dir / AMONG)]
-    return list(dict.fromkeys(str(text) for run in told for text in run.get(key, ())))
 
 
 def runs_in(out_dir: Path) -> list[dict[str, Any]]:

@@ -11,23 +11,14 @@ from matplotlib.backends.backend_pdf import PdfPages
 from reports import _content, colours
 from reports.alike import alike, of_what
 from reports.atomic import replacing
-from reports.case_files import (
-    WORST,
-    CaseFiles,
-    assumed,
-    counted,
-    not_reached,
-    not_run_sentence,
-    read_case,
-    results_in,
-    said_by_cases,
-)
+from reports.case_files import WORST, CaseFiles, counted, not_reached, not_run_sentence, read_case, results_in
 from reports.counts import scans
+from reports.doubts import assumed, said_by_cases
 from reports.figures import declared, figures_of
-from reports.html import readable_cases, run_files
 from reports.origin import why_not_pooled
 from reports.pdf_page import RIGHT, WIDE, Figured, Page
 from reports.records import read_json
+from reports.run_page import readable_cases, run_files
 from reports.schema import FAILURES, OVERALL_FILE, SUMMARY
 from reports.tables import read_if_there
 from reports.verdict import next_command, typed, unscored, verdict, worst_frames

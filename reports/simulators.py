@@ -8,13 +8,14 @@ from urllib.parse import quote
 import pandas as pd
 
 from reports import _content
-from reports.case_files import copied_from_traces, counted, listed, not_reached, not_run_sentence, warnings_in
+from reports.case_files import counted, listed, not_reached, not_run_sentence
+from reports.doubts import copied_from_traces, doubted, twins, warnings_in
 from reports.figures.simulators import SimulatorFiles, leads
 from reports.origin import why_not_pooled
 from reports.page import draw_sections, write_page
 from reports.schema import OURS, OVERALL_FILE, SIMULATORS, SUMMARY, WHERE, Column
 from reports.tables import read_if_there
-from reports.verdict import COPIED, NEVER_NEAREST, badge, tips_off, verdict
+from reports.verdict import NEVER_NEAREST, Doubt, badge, tips_off, verdict
 
 PAGE = "simulators.html"
 _MOST_WARNINGS = 5
@@ -78,15 +79,14 @@ def _said(alone: Mapping[Any, Any], folder: Path, lines: Sequence[str], copied: 
     missing, mixed, good = not_run_sentence(folder), why_not_pooled(folder), alone["frames_ok"]
     failed = f"On {good} of {alone['frames']} frames: " if good < alone["frames"] else ""
     status = "cases missing" if missing else "frames failed" if failed else "not pooled" if mixed else "ok"
-    said = verdict(row, alone["simulator"])
-    if copied and status == "ok":
-        status, said = COPIED, f"{copied}."
-        lines = [line for line in lines if line != copied]
+    doubt = Doubt(copied if status == "ok" else "", twins(doubted(folder)))
+    said = verdict(row, alone["simulator"], doubt)
+    lines = [line for line in lines if line != doubt.copied]
     said = failed + said if said else mixed or not_reached(folder) or "No frame of it has a result." * (not good)
     aside = f" Of the study {missing}." if missing else ""
     more = counted(rest := len(lines) - _MOST_WARNINGS, "more warning")
     return {
-        "badge": badge(status, status == "ok", row),
+        "badge": badge(status, status == "ok", row, doubt),
         "verdict": said + aside,
         "warnings": [*lines[:_MOST_WARNINGS], *[f"{more} on the pages of its cases"] * (rest > 0)],
     }

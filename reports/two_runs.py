@@ -8,8 +8,8 @@ from typing import Any, Literal
 
 import pandas as pd
 
-from reports.case_files import copied_from_traces, doubted, warnings_in
 from reports.diff import Difference
+from reports.doubts import copied_from_traces, doubted, warnings_in
 from reports.schema import ALL
 
 SHOWN = 30

@@ -4,12 +4,13 @@ import shlex
 from collections.abc import Iterable, Mapping, Sequence
 from math import inf, isnan, nan
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pandas as pd
 
 from reports._content import NOTHING, fewer_frames, interval, number, predictor_label
-from reports.case_files import WORST, counted, doubted, results_in, said_by_cases
+from reports.case_files import WORST, counted, results_in
+from reports.doubts import doubted, said_by_cases
 from reports.records import read_json
 from reports.schema import OURS, SUMMARY
 
@@ -19,11 +20,27 @@ _NOT_AGAIN = "--only", "--case-timeout", "--case-memory"
 """Options that the next command leaves out: other cases are meant, and a limit that stopped one stops it again."""
 
 
-def verdict(statistics: Mapping[str, Any], simulator: str = "") -> str:
+class Doubt(NamedTuple):
+    """Why numbers do not mean what they say: the warning, empty without one.
+
+    copied : the wires were made from the traces; nothing else counts then.     twins : insertions look like one that
+    was scanned again, and count as several.
+    """
+
+    copied: str = ""
+    twins: str = ""
+
+
+NO_DOUBT = Doubt()
+
+
+def verdict(statistics: Mapping[str, Any], simulator: str = "", doubt: Doubt = NO_DOUBT) -> str:
     """How far the simulated wire is from the traced one, and whether that beats what anybody would have guessed.
 
     statistics : a row of summary.csv or overall.csv.     simulator : whose wire it is, where there are several.
     """
+    if doubt.copied:
+        return f"{doubt.copied}."
     rms = number(statistics.get("rms_mm"))
     if rms == NOTHING:
         return ""
@@ -33,13 +50,16 @@ def verdict(statistics: Mapping[str, Any], simulator: str = "") -> str:
     sentence += f", 95 % interval {ends} mm" if ends else ""
     tail = number(statistics.get("p95_mm"))
     sentence += f"; 95 % of its points lie within {tail} mm." if tail != NOTHING else "."
-    return " ".join(filter(None, (sentence, *remarks(statistics, simulator), _against(statistics))))
+    true = number(statistics.get("truth_rms_mm"))
+    sentence += f" From the true wire it lies {true} mm." * (true != NOTHING)
+    again = f"But {TWINS} that was scanned again, and count as several: see the warnings." * bool(doubt.twins)
+    return " ".join(filter(None, (sentence, *remarks(statistics, simulator), _against(statistics), again)))
 
 
 WORSE = "worse than a guess"
 NO_BETTER, NOT_SHOWN = "no better than a guess", "not shown to be better than a guess"
 TOO_FEW = "too few insertions to tell"
-TIPS_OFF, COPIED = "the tips lie off", "made from the traces"
+TIPS_OFF, COPIED, TWINS = "the tips lie off", "made from the traces", "insertions look like one"
 NEVER_NEAREST = TIPS_OFF, COPIED
 """Why a simulator leads nowhere, whatever its distances to the traced wire."""
 TIPS_OFF_RATIO, TIPS_OFF_MM = 3.0, 0.5
@@ -102,12 +122,14 @@ def standing(statistics: Mapping[str, Any]) -> str:
     return TIPS_OFF if tips_off(statistics) else NOT_SHOWN if least <= 0.0 else ""
 
 
-def badge(status: str, good: bool, statistics: Mapping[str, Any]) -> dict[str, str]:
+def badge(status: str, good: bool, statistics: Mapping[str, Any], doubt: Doubt = NO_DOUBT) -> dict[str, str]:
     """The word beside a heading and its look: good, poor or bad. What ran well but is no better than a guess is poor.
 
     statistics : a row of summary.csv or overall.csv, empty where nothing was scored.
     """
-    poor = standing(statistics) if good else ""
+    if good and doubt.copied:
+        return {"text": COPIED, "look": "bad"}
+    poor = (TWINS if doubt.twins else standing(statistics)) if good else ""
     if poor == NOT_SHOWN and _skill(statistics)[1] > 0.0 and _few_insertions(statistics):
         poor = TOO_FEW  # a wire of skill 0.97 and one of 0.34 had one badge, as if neither were any good
     return {"text": poor or status, "look": "poor" if poor else "good" if good else "bad"}

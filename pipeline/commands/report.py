@@ -37,9 +37,9 @@ def main(args: argparse.Namespace) -> int:
     from pipeline.run.last_words import last_line, lost_lines
     from pipeline.run.results import found_results
     from pipeline.run.sweep import found_heads, lost_points, write_sweep
-    from reports.html import render_index
     from reports.inside import misleading_links
     from reports.records import damaged_records
+    from reports.run_page import render_index
 
     found = found_results(args.out)
     if not found:
@@ -142,7 +142,7 @@ def _others(out: Path, *, embed: bool) -> bool:
     from pipeline.run.aggregate import aggregate
     from pipeline.run.results import found_results
     from pipeline.run.simulators import side_by_side
-    from reports.html import render_index
+    from reports.run_page import render_index
     from reports.simulators import folders_in
 
     folders = folders_in(out)

@@ -18,7 +18,8 @@ from pipeline.run.kin import told_of_kin
 from pipeline.run.overall import Found, found_cases, frames_of, overall, shared_scans, strangers, validation
 from pipeline.run.results import Result, write_json
 from reports import tables
-from reports.case_files import AMONG, GOOD, doubted, not_reached
+from reports.case_files import GOOD, not_reached
+from reports.doubts import AMONG, doubted
 from reports.junit import Outcome, write_junit
 from reports.origin import why_not_pooled
 from reports.schema import FAILURES, OVERALL_FILE, SUMMARY, TIMINGS

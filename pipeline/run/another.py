@@ -20,6 +20,7 @@ from pipeline.run.overall import Found, phantoms_of
 from pipeline.run.stages.repeated import ALIKE
 from pipeline.run.traced import Traces, skip_mm_of, traces_of
 from reports.case_files import listed
+from reports.doubts import COUNT_AS
 
 ONE_WIRE = 3.0
 """Distance between two insertions' traces over their standard deviation, below which their wires lie alike: two scans
@@ -81,7 +82,7 @@ def copies(found: Sequence[Found]) -> list[str]:
     known_to = min((sigma for _, sigma in farthest.values()), default=math.nan)
     return [
         f"insertions {listed([*map(repr, names)])} are traced to within {apart:.2g} mm of another of them, where "
-        f"traces are known to {known_to:.2g} mm: they {what}, and count as {len(names)}; give their cases one "
+        f"traces are known to {known_to:.2g} mm: they {what}{COUNT_AS}{len(names)}; give their cases one "
         f"group{or_else}"
         for found_alike, what, or_else in ((written, WRITTEN, ""), (alike, RESCANNED, OR_ELSE))
         for names, apart in _together(found_alike)

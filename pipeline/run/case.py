@@ -27,7 +27,7 @@ from pipeline.study.manifest import Case
 from pipeline.study.settings import Resolved
 from reports import tables
 from reports.atomic import writing
-from reports.html import render_case
+from reports.case_page import render_case
 from reports.page import Each, compiled
 from reports.schema import BUDGET, ENTRIES, ERRORS, POINTS, TIMINGS
 from solver import warm_up

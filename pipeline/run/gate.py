@@ -60,7 +60,7 @@ def held(gates: Sequence[Gate], out: Path, overall: Mapping[str, Any], simulator
     Errors of wires that were made from the traces open no gate. overall : the row of the run into ``out``.
     simulator : whose wires they are, in a score.
     """
-    from reports.case_files import copied_from_traces, warnings_in  # half a second, for a gate that may be refused
+    from reports.doubts import copied_from_traces, warnings_in  # half a second, for a gate that may be refused
 
     asked = [gate for gate in gates if gate.asks(simulator)]
     copied = copied_from_traces(warnings_in(out)) if asked else ""  # reads the results of all cases

@@ -16,11 +16,12 @@ from pipeline.run.results import Result, found_results
 from pipeline.run.sweep import heads_of, lost_points
 from reports.alike import alike
 from reports.case_files import counted, left_over_sentence
+from reports.doubts import copied_from_traces, warnings_in
 from reports.origin import why_not_pooled
 from reports.schema import SWEEP
 from reports.sweep import silent_points
 from reports.tables import read_if_there
-from reports.verdict import in_short, next_command
+from reports.verdict import COPIED, in_short, next_command
 from reports.worse import worse_sentence
 
 
@@ -84,7 +85,8 @@ def last_line(totals: Totals, index: Path) -> str:
             judged < totals.cases
         )
         parts.append(f"rms {totals.pooled['rms_mm']:.3f} mm{over} ({in_words(low, high, said)})")
-        parts += filter(None, [in_short(totals.pooled)])
+        copied = copied_from_traces(warnings_in(index.parent))
+        parts += filter(None, [f"no score: the wires were {COPIED}" if copied else in_short(totals.pooled)])
     if totals.unscored:
         parts.append(totals.unscored.rstrip("."))
     if totals.frames and totals.solver_s:

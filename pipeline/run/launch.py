@@ -36,9 +36,10 @@ from pipeline.study.manifest import Case, Manifest
 from pipeline.study.same_scans import continued
 from pipeline.study.settings import to_toml
 from reports.atomic import WriteError, remove_leftovers, write_text, writing
-from reports.case_files import AMONG, counted, left_over, provenance_of
-from reports.html import render_index
+from reports.case_files import counted, left_over, provenance_of
+from reports.doubts import AMONG
 from reports.records import read_json
+from reports.run_page import render_index
 from reports.schema import FAILURES, OVERALL_FILE, SUMMARY, SWEEP, TIMINGS
 
 OVER_ALL = SUMMARY.file, OVERALL_FILE, FAILURES.file, TIMINGS.file, SWEEP.file, AMONG, "index.html", "summary.pdf"

@@ -17,9 +17,10 @@ from pipeline.run.another import with_another
 from pipeline.run.overall import Found, found_cases, frames_in, on_frames, overall, ratio, validation
 from pipeline.run.results import found_results
 from reports import tables
-from reports.case_files import copied_from_traces, listed, warnings_in
-from reports.html import render_index
+from reports.case_files import listed
+from reports.doubts import copied_from_traces, warnings_in
 from reports.origin import why_not_pooled
+from reports.run_page import render_index
 from reports.schema import FAILURES, OURS, POINTS, SIMULATORS, WHERE
 from reports.simulators import in_common, render_simulators
 from reports.verdict import COPIED, TIPS_OFF, tips_off

@@ -7,8 +7,9 @@ from pathlib import Path
 
 from reports import pdf, tables
 from reports.case_files import find_cases, read_case
+from reports.case_page import render_case
 from reports.figures import figures_of
-from reports.html import render_case, render_index
+from reports.run_page import render_index
 from reports.schema import ERRORS, SUMMARY
 from tests.numbers.drawn import TIMED, drawn, looks, said
 from tests.numbers.kept import Numbers, Scene

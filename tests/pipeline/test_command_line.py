@@ -215,6 +215,9 @@ def test_a_wire_thinner_than_half_a_voxel_is_warned_of_and_a_fitted_roll_not_ass
         assert main(["init", str(scans), "--wire-radius", radius]) == 0
         text = manifest.read_text(encoding="utf-8").replace('wire = "assumed"', 'wire = "assumed"\nroll_deg = "fit"')
         manifest.write_text(text, encoding="utf-8")
+        capsys.readouterr()
+        assert main(["check", str(manifest)]) == 0
+        assert ("less than half a voxel" in capsys.readouterr().out) == warned, "headers and manifest show it"
         main(["run", str(scans), "-o", str(tmp_path / radius), "--until", "load"])
         told = json.loads(next((tmp_path / radius).glob("cases/*/result.json")).read_text(encoding="utf-8"))
         assert any("less than half a voxel" in line for line in told["warnings"]) == warned

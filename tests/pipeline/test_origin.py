@@ -17,7 +17,7 @@ from pipeline.load import Source
 from pipeline.load.geometry import Mask
 from pipeline.run import aggregate, case, inputs
 from pipeline.study.manifest import read_manifest
-from reports.case_files import doubted
+from reports.doubts import doubted
 from reports.origin import what_differs, why_not_pooled
 from tests.pipeline.test_calibrate import PARAMETERS
 

@@ -18,7 +18,7 @@ from pipeline.run.last_words import failure_lines, last_line
 from pipeline.run.launch import Plan
 from pipeline.run.overall import found_cases, overall, ratio, shared_scans
 from reports import tables
-from reports.html import render_index
+from reports.run_page import render_index
 from reports.schema import ERRORS, POINTS
 
 GOOD, BAD = 0.3, 5.0

@@ -34,7 +34,7 @@ from pipeline.status import FrameStatus
 from reports import tables
 from reports.colours import TRACED, TRUE, rgb
 from reports.frames_file import read_scan
-from reports.html import render_index
+from reports.run_page import render_index
 from reports.schema import ERRORS, POINTS, SUMMARY, TIMINGS
 from solver import Status
 from tests.studies.trees import differences

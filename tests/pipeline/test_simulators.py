@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from pipeline.cli import main
 from pipeline.run.simulators import OF_SKILL, Piece, _rows, side_by_side, write_comparison
 from reports import tables
-from reports.case_files import MADE_FROM_TRACES
+from reports.doubts import MADE_FROM_TRACES
 from reports.schema import ERRORS, POINTS, SIMULATORS, SUMMARY, WHERE
 from reports.simulators import _where, in_common, render_simulators
 

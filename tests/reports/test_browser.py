@@ -20,8 +20,9 @@ from PIL import Image
 
 from reports import tables
 from reports.case_files import find_cases
+from reports.case_page import render_case
 from reports.figures._drawing import DOTS_PER_INCH
-from reports.html import render_case, render_index
+from reports.run_page import render_index
 from reports.schema import ERRORS
 from tests.reports.fake_pages import write_pages
 from tests.reports.fake_results import FakeCase, write_run

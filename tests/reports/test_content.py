@@ -10,8 +10,9 @@ import pytest
 
 from reports import _content
 from reports.calibration import gained
-from reports.case_files import counted, said_by_cases
+from reports.case_files import counted
 from reports.counts import scans
+from reports.doubts import said_by_cases
 from reports.schema import SWEEP
 
 

@@ -16,8 +16,9 @@ import pytest
 
 from reports import figures, tables
 from reports.case_files import find_cases, read_case
+from reports.case_page import render_case
 from reports.figures import Drawing, declared, figures_of
-from reports.html import render_case, render_index
+from reports.run_page import render_index
 from reports.schema import ERRORS, FAILURES, SUMMARY
 from tests.reports.fake_results import EVERY_KIND, FakeCase, write_run
 from tests.unseen import unseen as unseen

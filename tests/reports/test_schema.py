@@ -9,9 +9,10 @@ import pytest
 
 from reports import diff, tables
 from reports.case_files import read_case
+from reports.case_page import render_case
 from reports.figures import Drawing, figures_of
 from reports.figures._style import LINES, predictors
-from reports.html import render_case, render_index
+from reports.run_page import render_index
 from reports.schema import ERRORS, PLACES, SUMMARY, Column, predictor
 from tests.reports.fake_results import FakeCase, write_run
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from reports import tables
-from reports.html import render_index
+from reports.run_page import render_index
 from reports.schema import SWEEP
 from reports.sweep import UNCHANGED, silent_points
 from tests.reports.fake_results import FakeCase, write_run

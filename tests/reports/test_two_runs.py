@@ -14,7 +14,7 @@ from pipeline.cli import main
 from pipeline.run import ledger
 from pipeline.run.overall import Ratio
 from reports import tables
-from reports.case_files import MADE_FROM_TRACES
+from reports.doubts import MADE_FROM_TRACES
 from reports.junit import Outcome, write_junit
 from reports.origin import told_alike
 from reports.schema import ERRORS, POINTS, SIMULATORS

@@ -21,7 +21,8 @@ from pipeline.run.stages.rivals import rival_ways, rival_wires, simulated_rivals
 from pipeline.run.stages.views import compare_in_views
 from pipeline.simulate.clamp import ahead_of
 from pipeline.status import FrameStatus
-from reports.case_files import MADE_FROM_TRACES, counted, listed
+from reports.case_files import counted, listed
+from reports.doubts import MADE_FROM_TRACES
 from solver import Solution
 
 

@@ -2,9 +2,7 @@
 
 from dataclasses import replace
 
-import numpy as np
-
-from pipeline.load import Scans, read_headers
+from pipeline.load import read_headers
 from pipeline.load.curves import read_truth
 from pipeline.load.geometry import LoadError
 from pipeline.load.views import read_views
@@ -25,7 +23,7 @@ def open_case(run: Context, known: Known) -> Known:
         raise LoadError(f"case {case.id!r}: {wrong[0]}")
     run.log.assumptions += [case.calibrated] * bool(case.calibrated)
     run.log.warnings += [case.own_parameters] * bool(case.own_parameters)
-    run.log.warnings += [*implausible([case]), *in_case(case, scans.first), *_too_thin(case, scans)]
+    run.log.warnings += [*implausible([case]), *in_case(case, scans.first)]
     offset, rolls = run.config.simulate.roll_offset_deg, case.stated_roll_deg
     frames = [Frame(i, roll_deg=roll + offset) for i, roll in enumerate(each_frame(rolls, count))]
     if case.catheter:
@@ -41,26 +39,6 @@ def open_case(run: Context, known: Known) -> Known:
         run.log.warnings += odd_truth(case, truth)
         frames = [replace(f, truth_mm=points) for f, points in zip(frames, truth, strict=True)]
     return replace(known, scans=scans, frames=tuple(frames))
-
-
-THINNEST_VOXELS = 0.5
-
-
-def _too_thin(case: Case, scans: Scans) -> list[str]:
-    """A warning where the wire is so thin in its voxels that traces are worse than they say.
-
-    Measured on bends (`wireval synth bend --voxel-mm`): 0.36 mm in voxels of 0.4 to 0.6 mm lie off by 0.9 to 1.2 times
-    the stated sigma, in voxels of 0.8 mm by 2.5 times, with tips up to 0.7 mm off.
-    """
-    if not scans.frames or case.traces:
-        return []
-    voxel, diameter = float(np.prod(scans.frames[0].spacing_mm) ** (1.0 / 3.0)), 2.0 * case.wire.radius_mm
-    if diameter >= THINNEST_VOXELS * voxel:
-        return []
-    return [
-        f"the wire's diameter, {diameter:.2g} mm, is less than half a voxel ({voxel:.2g} mm): traces are off by "
-        "several times their trace_sigma_mm there, tips by a voxel and more; scan with smaller voxels"
-    ]
 
 
 def _axis_assumed(case: Case) -> list[str]:

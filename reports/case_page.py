@@ -1,0 +1,126 @@
+"""The page of a case, built from its files on disk, so that it can be built again at any time."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from reports import _content
+from reports._content import flatten, settings
+from reports.alike import alike
+from reports.case_files import GOOD, CaseFiles, counted, read_case
+from reports.counts import scans
+from reports.doubts import copied_from_traces
+from reports.figures import declared
+from reports.listing import listed_files, listed_view
+from reports.page import Each, begun_first, longest, one_by_one, section, write_page
+from reports.schema import ERRORS, FAILURES
+from reports.verdict import OF_CALIBRATION, Doubt, badge, next_command, typed, verdict, worst_frames
+from reports.viewer import viewer_data
+
+PHYSICS = ("wire", "catheter", "down", "wall", "entry", "chosen", "geometry")
+
+
+def render_case(case_dir: Path, embed: bool = False, each: Each = one_by_one) -> Path:
+    """Draw figures/*.png with their CSV and write report.html of one case; returns its path.
+
+    embed : put pictures and numbers into the page, for a single file to send.     each : who draws the figures.
+    Raises ValueError, naming the file, where a result file is damaged; absent files leave out what they would have
+    shown.
+    """
+    case = read_case(case_dir)
+    result, errors = case.result, case.errors
+    failures, copied = case_failures(case), copied_from_traces({case.name: result.get("warnings", ())})
+    frames = _content.grid(errors, ERRORS.shown("frames", "work"), bad=~errors["status"].isin(GOOD))
+    page = {
+        "title": " - ".join(filter(None, (case.name, case.simulator, "wireval"))),
+        "name": case.name,
+        "badge": badge(
+            result.get("status", "no result.json"), result.get("status") in GOOD, _scored(case), Doubt(copied)
+        ),
+        "verdict": _case_verdict(case, copied),
+        "worst": worst_frames({case.name: errors}, {}),
+        "next": next_command([case.name], typed(case_dir)),
+        **_drawn(case, embed, each),
+        **{key: result.get(key, "") for key in ("role", "group", "simulator")},
+        "failures": alike(failures),
+        **{key: result.get(key, ()) for key in ("warnings", "assumptions", "inputs")},
+        "numbers": _content.in_tiles(_content.cards(declared("cards"), case.statistics)),
+        "points": (case_dir / "points.csv.gz").exists(),
+        # of projections the assumptions say whether wires were shifted
+        "compared": bool(errors["rms_mm"].notna().any()) and "projections" not in result.get("chosen", {}),
+        "frames": frames if len(errors) else None,
+        "counters": list(flatten(result.get("counters", {}))),
+        "physics": list(flatten({key: result.get(key, {}) for key in PHYSICS})),
+        "config": settings(result.get("config", {})),
+        "provenance": list(flatten(result.get("provenance", {}))),
+        "files": listed_files(case_dir),
+        "view": listed_view(case_dir),
+        "version": version_of([result]),
+    }
+    return write_page("case.html.j2", page, case_dir / "report.html")
+
+
+def _drawn(case: CaseFiles, embed: bool, each: Each) -> dict[str, Any]:
+    """What is drawn on a case's page: the viewer and the sections; what takes longest is begun first."""
+    entries = declared("case")
+
+    def part(n: int) -> dict[str, Any]:
+        return section("case", entries[n - 1], case, case.folder, embed) if n else {"of": viewer_data(case)}
+
+    viewer, *sections = begun_first([0, *longest(entries)], part, 1 + len(entries), each)
+    frames = viewer["of"]["frames"] if viewer["of"] else ()
+    curves = {name for frame in frames for name in frame["curves"]}
+    return {"viewer": viewer["of"], "curves": curves, "sections": [one for one in sections if one]}
+
+
+def case_failures(case: CaseFiles) -> list[dict[str, Any]]:
+    """What went wrong: frame by frame as result.json says, what errors.csv says beyond that, or the whole case."""
+    whole = [dict(row) for row in case.result.get("failures", ()) if row.get("frame") is None]
+    if whole:  # a lumen that is not found fails every frame alike: said once, as in failures.csv
+        return [dict.fromkeys(FAILURES.names, "") | {"case": case.name} | row for row in whole]
+    rows = [dict(f) for f in case.result.get("frames", ()) if f.get("status") not in GOOD]
+    known = [row.get("frame") for row in rows]
+    others = case.errors[~case.errors["status"].isin(GOOD) & ~case.errors["frame"].isin(known)]
+    rows += [{"frame": int(f), "status": s} for f, s in zip(others["frame"], others["status"], strict=True)]
+    if not rows and case.result.get("status") not in GOOD:
+        rows = [{key: case.result.get(key, "") for key in ("stage", "status", "sentence", "message")}]
+    return [dict.fromkeys(FAILURES.names, "") | {"case": case.name} | row for row in rows]
+
+
+def _scored(case: CaseFiles) -> Mapping[str, Any]:
+    """The case's row of summary.csv; empty where its errors are no score."""
+    return {} if case.result.get("role") == "calibration" else case.statistics
+
+
+def _case_verdict(case: CaseFiles, copied: str) -> str:
+    """What became of the case, how many frames have a result, and how good they are.
+
+    Where some have none, why stands below, with the frames and the next command: said here, too, it read as if it were
+    of all.
+    """
+    nothing = "the case has no result.json: it did not finish; see log.txt"
+    said = str(case.result.get("sentence", nothing)).strip().rstrip(".")
+    good, planned = case.statistics.get("frames_ok"), case.statistics.get("frames")
+    became = said[:1].upper() + said[1:] + "."
+    if fitted := case.statistics.get("frames_fitted"):
+        became = scans(good or 0, planned or 0, fitted, scored_or_ok([case])) + "."
+    elif planned and good != planned:
+        became = f"{good} of {counted(planned, 'frame')} have a result."
+    scored = _scored(case)
+    how = verdict(scored, case.simulator, Doubt(copied)) if scored or not case.statistics else OF_CALIBRATION
+    judged = bool(how) and not copied and _content.number(scored.get("skill_strongest")) != _content.NOTHING
+    alone = "The predictor 'another insertion' may be stronger; it is judged over the run, on its first page." * judged
+    return " ".join(filter(None, (became, how, alone)))
+
+
+def scored_or_ok(cases: Sequence[CaseFiles]) -> str:
+    """What a frame with a result is called: not all are scored where parameters are learnt or nothing is compared."""
+    results = [case.result for case in cases]
+    learnt = any(result.get("role") == "calibration" or result.get("status") == "simulated" for result in results)
+    return "ok" if learnt else "scored"
+
+
+def version_of(infos: Sequence[Any]) -> str:
+    """The version of wireval that the first of the files names."""
+    found = (str(info.get("provenance", {}).get("wireval", "")) for info in infos)
+    return next(filter(None, found), "")

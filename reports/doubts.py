@@ -1,0 +1,76 @@
+"""What is doubtful of the cases of a run, each alone and among themselves, and what is assumed, as it was written."""
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from reports.case_files import find_cases, listed, runs_in
+from reports.records import read_json
+
+AMONG = "doubts.json"
+"""What is assumed and doubted of the cases of a folder among themselves; each run and ``wireval report`` look again."""
+_NUMBER = re.compile(r"[0-9]+(?:\.[0-9]+)?(?:e-?[0-9]+)?")
+COUNT_AS = ", and count as "
+"""What is said of insertions that look like fewer."""
+MADE_FROM_TRACES = "only wires that were made from the traces"
+"""What a warning of wires that lie nearer to the traces than these are known says; their errors are none."""
+
+
+def warnings_of(folder: Path) -> list[str]:
+    """What a case was warned of; nothing of one whose result cannot be read, which is said elsewhere."""
+    try:
+        return list(read_json(folder / "result.json").get("warnings", ()))
+    except ValueError:
+        return []
+
+
+def warnings_in(out_dir: Path) -> dict[str, list[str]]:
+    """What each case below an output folder was warned of."""
+    return {case.name: warnings_of(case) for case in find_cases(out_dir)}
+
+
+def copied_from_traces(warnings: Mapping[str, Sequence[str]]) -> str:
+    """The warning that simulated wires were made from the traces; empty where no case has it. warnings : by case."""
+    said = (f"{case}: {text}" for case, texts in warnings.items() for text in texts)
+    return next((text for text in said if MADE_FROM_TRACES in text), "")
+
+
+def twins(doubts: Iterable[str]) -> str:
+    """The doubt that insertions are one that was scanned again; empty without it."""
+    return next((text for text in doubts if COUNT_AS in text), "")
+
+
+def said_by_cases(results: Mapping[str, Mapping[str, Any]], key: str) -> list[str]:
+    """What the cases of a run say under ``warnings`` or ``assumptions``, a line each, with the cases that say it.
+
+    What differs in its numbers alone is one line, that of the first case. results : result.json by case.
+    """
+    if len(results) == 1:
+        return [str(text) for result in results.values() for text in result.get(key, ())]
+    said: dict[str, dict[str, list[str]]] = {}
+    for case, result in results.items():
+        for text in map(str, result.get(key, ())):
+            said.setdefault(_NUMBER.sub("#", text), {}).setdefault(text, []).append(case)
+    lines = []
+    for texts in said.values():
+        cases = dict.fromkeys(case for named in texts.values() for case in named)
+        others = len(texts) - 1
+        more = f" ({others} more with other numbers, on the pages of the cases)" * (others > 0)
+        lines.append(f"{listed([*cases])}: {next(iter(texts))}{more}")
+    return lines
+
+
+def doubted(out_dir: Path) -> list[str]:
+    """What is doubtful of the runs into a folder, and of its cases among themselves, each sentence once."""
+    return _told(out_dir, "doubts")
+
+
+def assumed(out_dir: Path) -> list[str]:
+    """What the runs into a folder assumed, and what is assumed of its cases among themselves, each sentence once."""
+    return _told(out_dir, "assumptions")
+
+
+def _told(out_dir: Path, key: str) -> list[str]:
+    told = [*runs_in(out_dir), read_json(out_dir / AMONG)]
+    return list(dict.fromkeys(str(text) for run in told for text in run.get(key, ())))
