@@ -137,15 +137,15 @@ def _plan(args: argparse.Namespace) -> "Plan":
     from pipeline.run.cache import default_root
     from pipeline.run.case import Job
     from pipeline.run.guards import guard_apart
+    from pipeline.run.inputs import named_files
     from pipeline.run.launch import Plan
     from pipeline.run.sweep import points_of
-    from pipeline.study.sources import files_of
 
     if args.executor:  # workers elsewhere know nothing of this process's working folder
         args.manifest, args.out = args.manifest.absolute(), args.out.absolute()
     guard_apart(args.out, [args.manifest])  # before an inferred manifest is written there
     manifest = given(args, None if args.dry_run else args.out)
-    guard_apart(args.out, (path.parent for case in manifest.cases for path in files_of(case).values()))
+    guard_apart(args.out, (path.parent for case in manifest.cases for path in named_files(case).values()))
     settings = resolved_settings(args)
     limits = _limits(args)
     cache = None if args.no_cache else default_root()

@@ -129,6 +129,8 @@ def _plans(args: argparse.Namespace) -> "dict[str, Plan]":
     from pipeline.run.cache import default_root
     from pipeline.run.calibrated import as_calibrated
     from pipeline.run.case import Job
+    from pipeline.run.guards import guard_apart
+    from pipeline.run.inputs import named_files
     from pipeline.run.launch import Plan
     from pipeline.status import UsageError
     from pipeline.study.manifest import Manifest, read_manifest
@@ -142,6 +144,7 @@ def _plans(args: argparse.Namespace) -> "dict[str, Plan]":
     if args.out.exists() and any(args.out.iterdir()) and not (args.out / "simulators").is_dir():
         raise UsageError([f"-o {args.out}: it is not empty and holds no score; name another folder"])
     names = named(args.curves)
+    guard_apart(args.out, (path.parent for case in manifest.cases for path in named_files(case).values()))
     if not args.fresh and (lost := [name for name in folders_in(args.out) if name not in (*names, OURS)]):
         what = f"it holds a score of {', '.join(lost)}, which would be replaced"
         raise UsageError([f"-o {args.out}: {what}; name another folder, name them again with --curves, or --fresh"])

@@ -17,12 +17,23 @@ from reports.case_files import find_cases
 from reports.origin import ABSENT, settings_of
 from reports.records import read_json
 
+WRITTEN = "cases", "sweep", "simulators", "figures"
+"""Folders of an output in which a run writes, and removes what was there before."""
+
 
 def guard_apart(out: Path, folders: Iterable[Path]) -> None:
-    """Refuse an output folder that holds inputs: results would lie among the scans, and --fresh would delete there."""
-    if out.resolve() in {folder.resolve() for folder in folders}:
-        beside = out.resolve().with_name(f"{out.resolve().name}-out").name
+    """Refuse an output folder that holds inputs: results would lie among the scans, and these would be removed.
+
+    folders : those that inputs lie in.
+    """
+    here, places = out.resolve(), {folder.resolve(): folder for folder in folders}
+    if here in places:
+        beside = here.with_name(f"{here.name}-out").name
         raise UsageError([f"-o {out}: this is the folder of the inputs; name another one for the results, as {beside}"])
+    for place, folder in places.items():
+        if place.is_relative_to(here) and place.relative_to(here).parts[0] in WRITTEN:
+            what = f"inputs lie in {folder}, and a run removes earlier results there"
+            raise UsageError([f"-o {out}: {what}; copy them to a folder of their own, or name another output folder"])
 
 
 def guard_out(out: Path, manifest: Path, settings: Resolved) -> None:

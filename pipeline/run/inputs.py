@@ -93,7 +93,7 @@ def other_file(case: Case, known: Sequence[Mapping[str, Any]], since: float) -> 
     written), is the same; any other is hashed.
     """
     rows = {str(row.get("key")): row for row in known}
-    for key, path in _named(case).items():
+    for key, path in named_files(case).items():
         if not path.exists():
             continue
         row, size = rows.get(key, {}), _size(path)
@@ -105,11 +105,11 @@ def other_file(case: Case, known: Sequence[Mapping[str, Any]], since: float) -> 
 
 def described(case: Case) -> list[dict[str, Any]]:
     """Every input file of a case, once: its key in the manifest, path, hash and size."""
-    named = {path: key for key, path in reversed(_named(case).items()) if path.exists()}
+    named = {path: key for key, path in reversed(named_files(case).items()) if path.exists()}
     return [{"key": key, "path": str(p), "sha256": file_hash(p), "bytes": _size(p)} for p, key in named.items()][::-1]
 
 
-def _named(case: Case) -> dict[str, Path]:
+def named_files(case: Case) -> dict[str, Path]:
     """Input files by key: the case's own, another simulator's wires, and those of the case whose clamp it borrows."""
     others = {} if case.simulated is None else files_of(case.simulated, "simulated.")
     return files_of(case) | others | ({} if case.entry_case is None else files_of(case.entry_case, "entry."))
@@ -117,7 +117,7 @@ def _named(case: Case) -> dict[str, Path]:
 
 def _all_of(case: Case) -> Iterator[Path]:
     """Every file that is read for a case: folders with all that is in them, headers with what holds their voxels."""
-    for path in dict.fromkeys(_named(case).values()):
+    for path in dict.fromkeys(named_files(case).values()):
         if path.exists():
             yield from _with_parts(path)
 

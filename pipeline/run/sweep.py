@@ -6,6 +6,7 @@ simulation and comparison only. An agreement that no parameter moves is suspicio
 
 from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -57,7 +58,7 @@ def _folder(head: Head) -> Path:
 
 def points_of(texts: Sequence[str], base: Sequence[Setting]) -> list[SweepPoint]:
     """``table.key=v1,v2`` texts as points; raises SettingsError for an unknown setting or value."""
-    points: list[SweepPoint] = []
+    points: dict[tuple[str, str], SweepPoint] = {}
     for text in texts:
         name, equals, values = text.partition("=")
         if not equals or not values.strip():
@@ -66,9 +67,8 @@ def points_of(texts: Sequence[str], base: Sequence[Setting]) -> list[SweepPoint]
             setting = parse_assignment(f"{name}={value}", "sweep")
             point = SweepPoint(name.strip(), value.strip(), resolve([*base, setting]))
             # 0.1 and 0.10 are one point
-            if not any(p.parameter == point.parameter and p.settings.config == point.settings.config for p in points):
-                points.append(point)
-    return points
+            points.setdefault((point.parameter, repr(attrgetter(point.parameter)(point.settings.config))), point)
+    return [*points.values()]
 
 
 def heads_of(plain: Resolved, cases: Sequence[Case], points: Sequence[SweepPoint]) -> list[Head]:

@@ -286,6 +286,24 @@ def test_what_settings_call_allowed_is_what_is_allowed() -> None:
     )
 
 
+@pytest.mark.parametrize("below", ["cases/straight/view", "sweep/x", "simulators/y/cases"])
+def test_inputs_where_results_are_removed_are_refused(
+    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], below: str
+) -> None:
+    """Curves that were corrected in the folder that a run had written them to were removed by the next one."""
+    out = tmp_path / "out"
+    (out / below).mkdir(parents=True)
+    curve = out / below / "wire_traced_000.csv"
+    curve.write_text("x_mm,y_mm,z_mm\n0,0,0\n0,0,9\n", encoding="utf-8")
+    text = (study / "manifest.toml").read_text(encoding="utf-8").replace("truth = ", f'lumen = "{curve}"\ntruth = ', 1)
+    (study / "own.toml").write_text(text, encoding="utf-8")
+    for words in (["run"], ["score", "--curves", f"mine={tmp_path}"]):
+        assert main([words[0], str(study / "own.toml"), "-o", str(out), *words[1:], "--fresh"]) == 2
+        heard = capsys.readouterr().err
+        assert "a run removes earlier results there" in heard or "holds no score" in heard
+    assert curve.exists()
+
+
 def test_a_gate_closes_on_the_limit_s_far_side_and_on_nothing_to_go_by() -> None:
     assert gate("rms_mm > 0.5") == Gate("rms_mm", ">", 0.5)
     for text, limit in (("5e-1", 0.5), (".5", 0.5), ("-1.", -1.0), ("+1E3", 1e3)):
