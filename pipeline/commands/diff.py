@@ -111,7 +111,10 @@ def _compared(first: Path, second: Path, tolerance: Mapping[str, float]) -> Any:
     unpaired = "over all frames nothing is judged: no frame has points in both runs" * (paired is None)
     said = paired.verdict(allowed, otherwise) if paired else ""
     pooled = _pooled(with_another(first, before), with_another(second, after))
-    caveat = "; ".join(filter(None, (otherwise, of_two_simulators(differs), unpaired, not_judged(tolerance))))
+    nearer = ""
+    if paired and paired.value < 1.0 / allowed and len(frames.regressions) and not otherwise:
+        nearer = f"but over all frames the errors are {paired.value:.3g} times those of the first run"
+    caveat = "; ".join(filter(None, (otherwise, of_two_simulators(differs), unpaired, not_judged(tolerance), nearer)))
     warned = warned_of(first), warned_of(second)
     told = told_alike(first, second), newly_warned(*warned), newly_void(*warned)
     return Verdict((first, second), differs, pooled, said, judged, frames, caveat, *told)

@@ -15,9 +15,12 @@ from numpy.typing import NDArray
 from pipeline.cli import main
 from pipeline.run.simulators import OF_SKILL, Piece, _rows, side_by_side, write_comparison
 from reports import tables
-from reports.doubts import MADE_FROM_TRACES
+from reports.case_page import render_case
+from reports.doubts import AMONG, COUNT_AS, MADE_FROM_TRACES
+from reports.run_page import render_index
 from reports.schema import ERRORS, POINTS, SIMULATORS, SUMMARY, WHERE
 from reports.simulators import _where, in_common, render_simulators
+from reports.verdict import Doubt, verdict
 
 Array = NDArray[np.float64]
 Law = Callable[[Array, Array, np.random.Generator], Array]
@@ -335,3 +338,18 @@ def test_wires_that_were_made_from_the_traces_are_not_ok(tmp_path: Path) -> None
     assert '<span class="status bad">made from the traces</span>' in page
     assert f"c0: 0.001 mm: {MADE_FROM_TRACES}." in page
     assert page.count('<span class="status good">ok</span>') == 1
+    for own in (render_index(theirs), render_case(theirs / "cases" / "c0")):
+        page = own.read_text(encoding="utf-8")
+        assert '<span class="status bad">made from the traces</span>' in page, "its own pages were green"
+        assert "(rms) from the traced one" not in page
+
+
+def test_insertions_that_look_like_one_have_no_green_badge(tmp_path: Path) -> None:
+    """Twelve scans of one wire were called worse than a guess, which was the wire itself; the reason stood below."""
+    out = write_tree(tmp_path, even(0.2))
+    assert '<span class="status good">ok</span>' in render_index(out).read_text(encoding="utf-8")
+    (out / AMONG).write_text(json.dumps({"doubts": [f"insertions 'a', 'b' tell no more than one{COUNT_AS}2"]}))
+    page = render_index(out).read_text(encoding="utf-8")
+    assert '<span class="status poor">insertions look like one</span>' in page
+    said = verdict({"rms_mm": 0.2}, doubt=Doubt(twins="insertions 'a', 'b' tell no more than one"))
+    assert said.endswith("But insertions look like one that was scanned again, and count as several: see the warnings.")

@@ -115,6 +115,21 @@ def test_the_verdict_follows_what_differs_and_ends_the_text(
     assert said.endswith("exit 1, the gate closes\n")
 
 
+def test_one_number_that_became_worse_does_not_hide_that_the_errors_are_smaller(
+    first: Path, second: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A calibration that made every error three times smaller was WORSE, for a penetration, and nothing else."""
+    times(second, 0.3)
+    path = second / "cases" / "b" / ERRORS.file
+    rows = tables.read(path, ERRORS)
+    rows.loc[1, "max_penetration_mm"] += 0.5
+    tables.write(path, ERRORS, rows)
+    assert main(["diff", str(first), str(second), "-q"]) == 1
+    said = capsys.readouterr().out
+    assert said.startswith("WORSE: 3 cases compared: 1 regression; the worst: case b frame 1, max_penetration_mm")
+    assert said.endswith("; but over all frames the errors are 0.3 times those of the first run\n")
+
+
 def test_pooled_errors_of_both_are_over_the_same_frames(
     first: Path, second: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
