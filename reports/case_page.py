@@ -14,8 +14,9 @@ from reports.figures import declared
 from reports.listing import listed_files, listed_view
 from reports.page import Each, begun_first, longest, one_by_one, section, write_page
 from reports.schema import ERRORS, FAILURES
-from reports.verdict import OF_CALIBRATION, Doubt, badge, next_command, typed, verdict, worst_frames
+from reports.verdict import OF_CALIBRATION, Doubt, badge, verdict
 from reports.viewer import viewer_data
+from reports.what_next import next_command, typed, worst_frames
 
 PHYSICS = ("wire", "catheter", "down", "wall", "entry", "chosen", "geometry")
 

@@ -21,7 +21,8 @@ from reports.records import read_json
 from reports.run_page import readable_cases, run_files
 from reports.schema import FAILURES, OVERALL_FILE, SUMMARY
 from reports.tables import read_if_there
-from reports.verdict import next_command, typed, unscored, verdict, worst_frames
+from reports.verdict import unscored, verdict
+from reports.what_next import next_command, typed, worst_frames
 from reports.worse import worse_sentence
 
 _MOST_FAILURES, _MOST_CASES, _MOST_SETTINGS = 8, 40, 24

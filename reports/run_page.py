@@ -33,7 +33,8 @@ from reports.records import read_json
 from reports.schema import FAILURES, OVERALL_FILE, SIMULATORS, SUMMARY, SWEEP
 from reports.sweep import silent_points
 from reports.tables import read_if_there
-from reports.verdict import Doubt, badge, next_command, typed, unscored, verdict, worst_frames
+from reports.verdict import Doubt, badge, unscored, verdict
+from reports.what_next import next_command, typed, worst_frames
 from reports.worse import worse_cases, worse_sentence
 
 

@@ -1,23 +1,13 @@
-"""What a page says first: the verdict in a sentence, the worst frames, the command that comes next."""
+"""What a page says first: how far the wire is off, and whether that is better than a guess."""
 
-import shlex
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from math import inf, isnan, nan
-from pathlib import Path
 from typing import Any, NamedTuple
 
-import pandas as pd
-
 from reports._content import NOTHING, fewer_frames, interval, number, predictor_label
-from reports.case_files import WORST, counted, results_in
-from reports.doubts import doubted, said_by_cases
-from reports.records import read_json
 from reports.schema import OURS, SUMMARY
 
-_MANY = 5
 _WIDE = "wide: "  # how the note on an interval over few insertions begins
-_NOT_AGAIN = "--only", "--case-timeout", "--case-memory"
-"""Options that the next command leaves out: other cases are meant, and a limit that stopped one stops it again."""
 
 
 class Doubt(NamedTuple):
@@ -52,8 +42,21 @@ def verdict(statistics: Mapping[str, Any], simulator: str = "", doubt: Doubt = N
     sentence += f"; 95 % of its points lie within {tail} mm." if tail != NOTHING else "."
     true = number(statistics.get("truth_rms_mm"))
     sentence += f" From the true wire it lies {true} mm." * (true != NOTHING)
+    sentence += _at_the_floor(statistics)
     again = f"But {TWINS} that was scanned again, and count as several: see the warnings." * bool(doubt.twins)
     return " ".join(filter(None, (sentence, *remarks(statistics, simulator), _against(statistics), again)))
+
+
+FLOOR_SIGMAS = 1.4142
+"""The distance of a right wire from its trace over the trace's standard deviation along each of two axes."""
+
+
+def _at_the_floor(statistics: Mapping[str, Any]) -> str:
+    """That an error is no larger than a perfect wire's, where the traces are known no better than that."""
+    floor = FLOOR_SIGMAS * _number(statistics.get("trace_sigma_mm"))
+    if not _number(statistics.get("rms_mm")) <= floor:
+        return ""
+    return f" A perfect wire would lie {number(floor)} mm from these traces: nothing less tells one wire from another."
 
 
 WORSE = "worse than a guess"
@@ -239,56 +242,3 @@ def _rival(name: str) -> str:
     column = f"null_{name}_rms_mm"
     words = SUMMARY[column].meaning.partition("predictor: ")[2].partition(";")[0] if column in SUMMARY.names else ""
     return f"the strongest trivial predictor: {words or name.replace('_', ' ')}"
-
-
-def worst_frames(tables: Mapping[str, pd.DataFrame], links: Mapping[str, str]) -> list[dict[str, Any]]:
-    """The frames that are scored and worst, worst first: case, frame, text and link of each.
-
-    tables : errors.csv by case.     links : of the cases' pages.
-    """
-    good = {case: table[table["status"].eq("ok") & table[WORST].notna()] for case, table in tables.items()}
-    rows = [(float(v), case, int(n)) for case, t in good.items() for n, v in zip(t["frame"], t[WORST], strict=True)]
-    rows.sort(key=lambda row: (-row[0], *row[1:]))
-    return [
-        {"case": case, "frame": frame, "text": number(value), "link": links.get(case, "")}
-        for value, case, frame in rows[:_MANY]
-    ]
-
-
-def warned(out_dir: Path) -> list[str]:
-    """What is doubtful among the cases of a run, and what was warned of in each, a line each text, of these a few.
-
-    Once for all cases that say it: on a screen of 30 lines the failures above are to stay in sight.
-    """
-    lines = [f"warning: {text}" for text in said_by_cases(results_in(out_dir), "warnings")]
-    rest = len(lines) - _MANY
-    more = [f"{counted(rest, 'more warning')} on the pages of the cases"] * (rest > 0)
-    return [*(f"warning: {text}" for text in doubted(out_dir)), *lines[:_MANY], *more]
-
-
-def typed(folder: Path) -> Sequence[str]:
-    """The command that wrote a run's or a case's folder; none where nothing tells."""
-    words = read_json(folder / "provenance.json").get("argv", ())
-    return [str(word) for word in words] if isinstance(words, list) else ()
-
-
-def next_command(cases: Iterable[str], typed: Sequence[str] = ()) -> str:
-    """The command that computes these cases again, also after what the message says was done to the manifest.
-
-    typed : the command of this run, where it is known; MANIFEST and OUT stand where it is not. More than a few cases
-    are not named: what is finished is kept anyway, and by ``score``, which runs all, without being asked.
-    """
-    if list(typed[:2]) == ["wireval", "score"]:
-        return shlex.join(word for word in typed if word != "--fresh")
-    named = list(dict.fromkeys(cases))
-    only = [word for case in named for word in ("--only", case)] if len(named) <= _MANY else []
-    head = list(typed) if list(typed[:2]) == ["wireval", "run"] else ["wireval", "run", "MANIFEST", "-o", "OUT"]
-    kept, words, left_out = [], iter(head), (*_NOT_AGAIN, *("--shard",) * bool(only))
-    for word in words:
-        name, equals, _ = word.partition("=")
-        if name in left_out:
-            if not equals:
-                next(words, None)
-        elif word not in ("--fresh", "--resume"):
-            kept.append(word)
-    return shlex.join([*kept, *only, "--resume"])

@@ -122,7 +122,8 @@ def _sound(plan: "Plan", skip_bad: bool) -> "Plan":
 def _tell(plan: "Plan", totals: "Totals", closed: "Sequence[str]") -> None:
     """What went wrong, on stderr, and what to bear in mind; warnings are not among the result, which -q prints."""
     from pipeline.run.last_words import failure_lines
-    from reports.verdict import remarks, warned
+    from reports.verdict import remarks
+    from reports.what_next import warned
 
     warnings = warned(plan.out)
     for line in [*failure_lines(plan), *closed, *(warnings if plan.template.quiet else ())]:

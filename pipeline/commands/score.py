@@ -54,7 +54,7 @@ def main(args: argparse.Namespace) -> int:
     from reports.inside import misleading_links
     from reports.schema import OURS, SIMULATORS, WHERE
     from reports.simulators import PAGE
-    from reports.verdict import warned
+    from reports.what_next import warned
 
     gates = [gate(text, [*named(args.curves), OURS]) for text in args.fail_if]
     plans = _plans(args)

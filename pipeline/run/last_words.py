@@ -21,7 +21,8 @@ from reports.origin import why_not_pooled
 from reports.schema import SWEEP
 from reports.sweep import silent_points
 from reports.tables import read_if_there
-from reports.verdict import COPIED, in_short, next_command
+from reports.verdict import COPIED, in_short
+from reports.what_next import next_command
 from reports.worse import worse_sentence
 
 

@@ -38,7 +38,7 @@ SUMMARY_HEADER = (
     "trace_tip_median_mm,truth_rms_mm,max_penetration_mm,push_force_max_N,strongest_frames,frames_fitted,ends_rank,"
     "strongest_insertions,warnings,"
     "tip_along_median_mm,tip_across_median_mm,depth_offset_mm,side_ok,null_roll_unknown_rms_mm,null_no_tip_curve_rms_mm,"
-    "null_pinned_rms_mm,null_neighbours_rms_mm,num_mm,u_input_mm,u_val_mm,share_beyond_2u,log_score_bits,"
+    "null_pinned_rms_mm,null_neighbours_rms_mm,trace_sigma_mm,num_mm,u_input_mm,u_val_mm,share_beyond_2u,log_score_bits,"
     "energy_score_mm"
 )
 TIMINGS_HEADER = "case,frame,load_s,segment_s,trace_s,clamp_s,simulate_s,compare_s,total_s,peak_memory_MiB"

@@ -7,7 +7,8 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from reports.verdict import badge, in_short, next_command, typed, unscored, verdict, warned, worst_frames
+from reports.verdict import badge, in_short, unscored, verdict
+from reports.what_next import next_command, typed, warned, worst_frames
 from reports.worse import worse_sentence
 from tests.reports.fake_results import FakeCase, write_run
 
@@ -36,6 +37,14 @@ def test_of_a_study_with_truth_the_true_error_is_said_first() -> None:
     """Of 0.181 mm in coarse voxels the trace made most: 0.081 mm stood under "7 more numbers"."""
     row = {"rms_mm": 0.181, "p95_mm": 0.4, "truth_rms_mm": 0.081}
     assert verdict(row).endswith("95 % of its points lie within 0.400 mm. From the true wire it lies 0.0810 mm.")
+
+
+def test_an_error_below_what_the_traces_are_known_to_is_told() -> None:
+    """A wire 0.037 mm from its traces, which are known to 0.08 mm, was ok, with a skill of 0.997."""
+    row = {"rms_mm": 0.037, "trace_sigma_mm": 0.08}
+    assert "A perfect wire would lie 0.113 mm from these traces" in verdict(row)
+    assert "perfect" not in verdict(row | {"rms_mm": 0.12})
+    assert "perfect" not in verdict({"rms_mm": 0.037}), "of own curves nobody knows"
 
 
 @pytest.mark.parametrize(
