@@ -4,14 +4,17 @@ Each case says it of itself: a folder may hold cases that were run at different 
 """
 
 from collections.abc import Iterable, Mapping, Sequence
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from reports.case_files import listed, manifests_in, results_in, runs_in
+from reports.case_files import counted, listed, manifests_in, results_in, runs_in
 from reports.records import read_json
 
 CODE = {"wireval": "wireval", "git_commit": "commit", "git_dirty": "changed files", "python": "Python"}
 ABSENT, TOLD, UNTOLD = "(none)", "stand in its results", "(not kept)"
+WIRES = "simulated.files"
+"""Key of the manifest for another simulator's wires, and how their files' keys begin."""
 Told = dict[str, str]
 """What something was made from, each under a name for a reader."""
 
@@ -39,7 +42,7 @@ def what_differs(before: Path, after: Path) -> list[dict[str, str]]:
 
 def of_two_simulators(differs: Sequence[Mapping[str, str]]) -> str:
     """That one run's wires are the solver's own and the other's another simulator's. differs : of ``what_differs``."""
-    handed = [row for row in differs if ": simulated.files" in row["what"] and ABSENT in (row["before"], row["after"])]
+    handed = [row for row in differs if row["what"].endswith(f": {WIRES}") and ABSENT in (row["before"], row["after"])]
     return "the wires of one run are the solver's own, those of the other another simulator's" * bool(handed)
 
 
@@ -153,9 +156,20 @@ def _cases(found: Iterable[str]) -> Told:
 
 
 def _inputs(found: Mapping[str, Mapping[str, Any]], cases: Iterable[str]) -> dict[tuple[str, str], str]:
-    """Hashes by case and key of the manifest; rows of an older version, which have no key, by their paths."""
-    return {
-        (case, str(item.get("key", item["path"]))): str(item["sha256"])[:12]
-        for case in sorted(cases)
-        for item in found[case].get("inputs", ())
-    }
+    """Hashes by case and key of the manifest; rows of an older version, which have no key, by their paths.
+
+    Another simulator's wires, of which all files differ where the simulator does, have one hash together.
+    """
+    hashes: dict[tuple[str, str], str] = {}
+    for case in sorted(cases):
+        wires = []
+        for item in found[case].get("inputs", ()):
+            key, value = str(item.get("key", item["path"])), str(item["sha256"])[:12]
+            if key.startswith(WIRES):
+                wires.append(value)
+            else:
+                hashes[case, key] = value
+        if wires:
+            together = sha256("".join(wires).encode()).hexdigest()[:12]
+            hashes[case, WIRES] = f"{counted(len(wires), 'file')}, {together}"
+    return hashes

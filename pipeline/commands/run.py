@@ -65,7 +65,7 @@ def main(args: argparse.Namespace) -> int:
 def _run(args: argparse.Namespace, gates: "Sequence[Gate]") -> int:
     from pipeline.run.aggregate import write_tests
     from pipeline.run.batch import require_cluster
-    from pipeline.run.gate import held
+    from pipeline.run.gate import held, open_lines
     from pipeline.run.last_words import last_line
     from pipeline.run.launch import intention, launch
     from pipeline.run.results import found_results
@@ -90,6 +90,8 @@ def _run(args: argparse.Namespace, gates: "Sequence[Gate]") -> int:
     if args.junit:
         write_tests(args.junit, {"": found_results(plan.out)}, judged)
     _tell(plan, totals, closed)
+    for line in () if plan.template.quiet else open_lines(gates, judged, totals.pooled):
+        say(line)
     say(last_line(totals, index))
     return 0 if totals.all_ok and not closed else 1
 

@@ -67,6 +67,12 @@ def held(gates: Sequence[Gate], out: Path, overall: Mapping[str, Any], simulator
     return {g.asked: f"gate closed: {g.asked}: {copied}" if copied else g.closed(overall) for g in asked}
 
 
+def open_lines(gates: Sequence[Gate], judged: Mapping[str, str], overall: Mapping[str, Any]) -> list[str]:
+    """What is said of the gates that were asked and are open. judged : of ``held``."""
+    passed = [gate for gate in gates if judged.get(gate.asked) == ""]
+    return [f"gate open: {gate.asked}: {gate.column} is {float(overall[gate.column]):.4g}" for gate in passed]
+
+
 def gate(text: str, simulators: Sequence[str] = ()) -> Gate:
     """Parse ``column>number``; UsageError where it is malformed, or where the column is no number of overall.csv.
 
@@ -74,11 +80,11 @@ def gate(text: str, simulators: Sequence[str] = ()) -> Gate:
     """
     found = WRITTEN.fullmatch(text)
     name, column, relation, limit = found.groups() if found else ("", "", "", "nan")
-    number = float(limit)
+    number, names = float(limit), [one.name for one in SUMMARY if one.kind != "text"]
     if not math.isfinite(number):
         do = f'write a column of {OVERALL_FILE} and a limit in plain digits, as in "rms_mm>0.5" or "rms_mm>5e-1"'
-        raise UsageError([f"--fail-if {text!r}: {do}"])
-    names = [one.name for one in SUMMARY if one.kind != "text"]
+        unquoted = "; in a shell put it in quotes: a bare > writes into a file" * (text.strip() in names)
+        raise UsageError([f"--fail-if {text!r}: {do}{unquoted}"])
     if column not in names:
         raise UsageError([f"--fail-if {text!r}: no number {column!r} in {OVERALL_FILE}; {did_you_mean(column, names)}"])
     if name and name not in simulators:

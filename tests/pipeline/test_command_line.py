@@ -66,7 +66,7 @@ TOO_LONG = (
         ("synth straight -o /proc/none", "cannot be written"),
         ("bench --quick -o /proc/none", "cannot be written"),
         ("run STUDY -o y --fail-if rms>1", "did you mean 'rms_mm'?"),
-        ("run STUDY -o y --fail-if rms_mm", "write a column"),
+        ("run STUDY -o y --fail-if rms_mm", "in a shell put it in quotes: a bare > writes into a file"),
         ("run STUDY -o y --fail-if rms_mm>nan", "write a column"),
         ("run STUDY -o y --fail-if rms_mm>inf", "write a column"),
         ("run STUDY -o y --fail-if rms_mm>1e999", "write a column"),

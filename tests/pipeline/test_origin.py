@@ -18,7 +18,7 @@ from pipeline.load.geometry import Mask
 from pipeline.run import aggregate, case, inputs
 from pipeline.study.manifest import read_manifest
 from reports.doubts import doubted
-from reports.origin import what_differs, why_not_pooled
+from reports.origin import of_two_simulators, what_differs, why_not_pooled
 from tests.pipeline.test_calibrate import PARAMETERS
 
 QUICK = ("--until", "load", "-q")
@@ -64,6 +64,21 @@ def test_every_input_of_a_run_is_held_against_the_other_s(study: Path, tmp_path:
     truth = study / "truth.json"
     truth.write_text(truth.read_text(encoding="utf-8") + " ", encoding="utf-8")
     assert differing(study, tmp_path) == {"input of a, b: frames[0]", "input of a, b: truth"}
+
+
+def test_the_wires_of_another_simulator_are_one_input(study: Path, tmp_path: Path) -> None:
+    """Every file's hash stood before the verdict on two simulators."""
+    run(study, tmp_path / "before")
+    run(study, tmp_path / "after")
+    path = tmp_path / "after" / "cases" / "a" / "result.json"
+    result = json.loads(path.read_text(encoding="utf-8"))
+    wires = [{"key": f"simulated.files[{n}]", "path": f"w{n}.csv", "sha256": f"{n}" * 64} for n in range(2)]
+    path.write_text(json.dumps(result | {"inputs": [*result["inputs"], *wires]}), encoding="utf-8")
+    differs = what_differs(tmp_path / "before", tmp_path / "after")
+    (row,) = differs
+    assert (row["what"], row["before"]) == ("input of a: simulated.files", "(none)")
+    assert row["after"].startswith("2 files, ")
+    assert of_two_simulators(differs)
 
 
 def test_given_parameters_are_told_by_their_content(study: Path, tmp_path: Path) -> None:
