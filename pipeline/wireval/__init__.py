@@ -7,8 +7,8 @@
     results.errors.plot(x="insertion_mm", y="rms_mm")
 
 Here is no code of its own: ``check``, ``run``, ``score`` and ``calibrate`` are the verbs as typed, everything else is
-re-exported. What cannot be used raises ``InputError`` (or ``StageError``, where a scan shows nothing to go by) with the
-sentences of the terminal.
+re-exported; other verbs (synth, diff, report, ...) are on the command line alone. What cannot be used raises
+``InputError`` (or ``StageError``, where a scan shows nothing to go by) with the sentences of the terminal.
 """
 
 import json

@@ -15,16 +15,9 @@ from pipeline.load import Header, LoadError, Source, read_header
 from pipeline.load.curves import read_truth
 from pipeline.load.order import natural_key
 from pipeline.model import Array
+from pipeline.study.devices import implausible
 from pipeline.study.manifest import ManifestError, read_manifest
-from pipeline.study.plausible import (
-    implausible,
-    in_case,
-    measured_otherwise,
-    odd_depths,
-    odd_truth,
-    other_voxels,
-    wrapped_rolls,
-)
+from pipeline.study.plausible import in_case, measured_otherwise, odd_depths, odd_truth, other_voxels, wrapped_rolls
 from pipeline.study.same_scans import continued
 from pipeline.study.settings import Config
 

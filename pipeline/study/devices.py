@@ -1,0 +1,112 @@
+"""What a manifest says of a wire or a catheter and hardly can be: one that nobody makes, or in another unit."""
+
+from collections.abc import Iterable, Iterator
+
+import numpy as np
+
+from pipeline.model import OverWire, Wire
+from pipeline.study.manifest import Case
+
+RADII_MM = (0.1, 0.5)
+"""Guide wires of 0.008 to 0.038 inch: radii of 0.10 to 0.48 mm."""
+SOFTEST_GPA, STIFFEST_GPA = 0.1, 400.0
+"""Moduli that a solid rod would bend like the wire's stiffest part with: rubber's and tungsten's. Guide wires of 0.035
+inch were measured at 9.5 to 158 GPa (Harrison et al., J Endovasc Ther 18, 2011, doi 10.1583/11-3592.1); the wires of
+the catalogue have 4.9. A factor of 1000 takes any of them out of this range."""
+
+HEAVIEST_N_MM3 = 2.0e-4
+"""Weight of tungsten or platinum, 19.3 to 21.5 g/cm3, a fluid's lift left out."""
+SHARPEST = 0.5
+"""Of a wire's radius over that of its bend: about its own diameter nobody bends a wire, J tips of 1.5 mm have 0.3."""
+LEAST_TWIST, MOST_TWIST, ROD_TWIST = 0.01, 3.0, 0.77
+"""Torsional stiffness over that of the stiffest bend, guide wires' and a round rod's, which is 1 / (1 + Poisson's ratio
+of 0.3): a coil about a core bends stiffly for its twist or twists stiffly for its bend; a unit is 1000 or more off."""
+STIFFER_TIP = 1.5
+"""How much stiffer than its far end the tip is at least where it is doubted."""
+
+
+def implausible(cases: Iterable[Case]) -> list[str]:
+    """Sentences on the wires of these cases, a wire of several cases once."""
+    return list(dict.fromkeys(f"wire {case.wire.name!r}: {text}" for case in cases for text in _oddities(case.wire)))
+
+
+def _rod_of_1_gpa(radius_mm: float) -> float:
+    """Bending stiffness of a solid rod, N mm2."""
+    return 1000.0 * 0.25 * float(np.pi) * radius_mm**4
+
+
+def _oddities(wire: Wire) -> Iterator[str]:
+    radius, (thinnest, thickest) = wire.radius_mm, RADII_MM
+    if not thinnest <= radius <= thickest:
+        what = "is it the diameter, or in another unit?" if radius > thickest else "is it in another unit?"
+        yield f"radius_mm = {radius:g}: guide wires have {thinnest:g} to {thickest:g} mm; {what}"
+    profile = np.atleast_2d(wire.bending_stiffness_N_mm2)[:, -1]
+    tip, shaft, most = float(profile[0]), float(profile[-1]), float(profile.max())
+    of_1_gpa = _rod_of_1_gpa(radius)
+    modulus = most / of_1_gpa
+    if not SOFTEST_GPA <= modulus <= STIFFEST_GPA:
+        least, largest = SOFTEST_GPA * of_1_gpa, STIFFEST_GPA * of_1_gpa
+        yield (
+            f"bending_stiffness_N_mm2 of {most:.3g} at the most: a rod of radius_mm = {radius:g} has {least:.2g} (of "
+            f"rubber) to {largest:.3g} N mm2 (of tungsten), and guide wires lie between; is it in another unit, or the "
+            "radius wrong?"
+        )
+    sharpest = float(np.abs(np.atleast_2d(wire.rest_curvature_per_mm)[:, -1]).max())
+    if sharpest * radius > SHARPEST:
+        yield (
+            f"rest_curvature_per_mm of {sharpest:.3g} at the most: a bend of {1.0 / sharpest:.2g} mm radius in a wire "
+            f"of radius_mm = {radius:g}; is it a radius (mm), or per metre?"
+        )
+    heaviest = HEAVIEST_N_MM3 * np.pi * radius**2
+    if wire.weight_N_per_mm > heaviest:
+        yield (
+            f"weight_N_per_mm = {wire.weight_N_per_mm:.3g}: a rod of tungsten of radius_mm = {radius:g} weighs "
+            f"{heaviest:.2g} N/mm; is it in another unit?"
+        )
+    if tip > STIFFER_TIP * shaft:
+        yield (
+            f"bending_stiffness_N_mm2 is {tip:g} at the tip and {shaft:g} at its far end: guide wires are softest at "
+            "the tip; profiles count from the tip, is it turned round?"
+        )
+    yield from _of_twist(wire.torsional_stiffness_N_mm2, most)
+
+
+def _of_twist(twist: float, bend: float) -> Iterator[str]:
+    """A sentence where the torsional stiffness is in another unit than that of the stiffest bend."""
+    if np.isfinite(twist) and not LEAST_TWIST * bend <= twist <= MOST_TWIST * bend:
+        yield (
+            f"torsional_stiffness_N_mm2 = {twist:.3g} is {twist / bend:.2g} times the wire's largest bending stiffness"
+            f" of {bend:.3g}: a round rod has {ROD_TWIST:g} times, guide wires {LEAST_TWIST:g} to {MOST_TWIST:g}; is "
+            "one of them in another unit (1 N m2 is 1e6 N mm2)? Left out, the wire does not twist"
+        )
+
+
+CATHETER_RADII_MM = (0.2, 2.0)
+"""Outer hulls of 1.2 to 12 French: from the end of a microcatheter to a guiding sheath."""
+SOFTEST_TUBE_GPA, STIFFEST_TUBE_GPA = 0.002, 150.0
+"""Moduli that a solid rod of a catheter's radius would bend like it with: tubes of silicone of 5 MPa with a wall of a
+tenth of the radius, and of steel with one of three tenths."""
+USUAL_TUBE_GPA = (0.04, 0.4)
+"""Those of catheters of 5 French (a radius of 0.9 mm) with 20 to 200 N mm2."""
+
+
+def odd_catheter(catheter: OverWire | None) -> list[str]:
+    """Sentences where a catheter hardly can be one."""
+    return [] if catheter is None else [f"catheter {text}" for text in _of_catheter(catheter)]
+
+
+def _of_catheter(catheter: OverWire) -> Iterator[str]:
+    radius, (thinnest, thickest) = catheter.radius_mm, CATHETER_RADII_MM
+    if not thinnest <= radius <= thickest:
+        what = "is it in French (6 of them are a radius of 1 mm)?" if radius > thickest else "is it in another unit?"
+        yield f"radius_mm = {radius:g}: catheters have {thinnest:g} to {thickest:g} mm; {what}"
+        return  # what a tube bends like goes by the fourth power of it
+    stiffness, of_1_gpa = catheter.bending_stiffness_N_mm2, _rod_of_1_gpa(radius)
+    if stiffness > 0.0 and not SOFTEST_TUBE_GPA <= stiffness / of_1_gpa <= STIFFEST_TUBE_GPA:  # 0 is none, on purpose
+        least, largest = (gpa * of_1_gpa for gpa in (SOFTEST_TUBE_GPA, STIFFEST_TUBE_GPA))
+        usual = " to ".join(f"{gpa * of_1_gpa:.3g}" for gpa in USUAL_TUBE_GPA)
+        yield (
+            f"bending_stiffness_N_mm2 = {stiffness:.3g}: a tube of radius_mm = {radius:g} has {least:.2g} (of soft "
+            f"silicone) to {largest:.2g} N mm2 (of steel), and {usual} is usual; is it in another unit (1 N m2 is "
+            "1e6 N mm2), or the radius wrong?"
+        )
