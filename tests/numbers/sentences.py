@@ -16,7 +16,7 @@ from pipeline.load.geometry import Header, Source
 from pipeline.model import Curve, OtherWire, OverWire, Wire
 from pipeline.run.stages import depths, own_curves
 from pipeline.run.stages.known import Frame
-from pipeline.study import plausible
+from pipeline.study import devices, plausible
 from pipeline.study.manifest import Case, read_manifest
 from reports import _content, verdict
 from tests.numbers.drawn import said
@@ -90,7 +90,7 @@ def wires() -> Numbers:
     """Of wires and catheters that hardly can be."""
     rng, told, over = np.random.default_rng(2), [], []
     for _ in range(COUNT):
-        radius = float(one_of(rng, *plausible.RADII_MM, 0.05, 0.18, 0.45, 1.3))
+        radius = float(one_of(rng, *devices.RADII_MM, 0.05, 0.18, 0.45, 1.3))
         rod = 250.0 * np.pi * radius**4
         soft, stiff = (float(rod * one_of(rng, 1e-4, 2e-3, 0.05, 0.5, 5.0, 60.0, 390.0, 500.0, 1e5)) for _ in range(2))
         wire = Wire(
@@ -101,10 +101,10 @@ def wires() -> Numbers:
             stiff * one_of(rng, 0.009, 0.01, 0.77, 3.0, 3.1, INF),
             float(one_of(rng, 0.0, 1e-4, 1.0) * np.pi * radius**2),
         )
-        told.append(" ".join(plausible._oddities(wire)))
+        told.append(" ".join(devices._oddities(wire)))
         radius = float(one_of(rng, 0.1, 0.2, 0.9, 2.0, 2.1))
         stiffness = 250.0 * np.pi * radius**4 * one_of(rng, 0.0, 0.0019, 0.002, 0.1, 150.0, 151.0)
-        over.append(" ".join(plausible.odd_catheter(OverWire(float(stiffness), radius, 4.0))))
+        over.append(" ".join(devices.odd_catheter(OverWire(float(stiffness), radius, 4.0))))
     return together(wires=told, catheters=over)
 
 
