@@ -81,6 +81,9 @@ def unwritable(place: Path, option: str) -> list[str]:
     Tried with a folder that goes again, in the nearest one that exists: permissions alone do not tell.
     """
     try:
+        loose = next((one for one in (place, *place.absolute().parents) if one.is_symlink() and not one.exists()), None)
+        if option == "-o" and loose is not None:
+            return [f"{option} {place}: {loose} is a link to nothing ({loose.readlink()}); remove it, or name a folder"]
         if option == "-o" and place.exists() and not place.is_dir():
             return [f"{option} {place}: this is a file; name a folder"]
         if option != "-o" and place.is_dir():

@@ -130,6 +130,18 @@ def test_a_place_is_tried_without_leaving_anything(tmp_path: Path) -> None:
     assert unwritable(Path("x" * 300), "-o")
 
 
+def test_an_output_that_is_a_link_to_nothing_is_called_so(
+    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """ "File exists; make room" was said of it."""
+    link = tmp_path / "link"
+    link.symlink_to(tmp_path / "gone")
+    for out in (link, link / "below"):
+        assert main(["run", str(study), "-o", str(out)]) == 2
+        said = f"-o {out}: {link} is a link to nothing ({tmp_path / 'gone'}); remove it, or name a folder\n"
+        assert capsys.readouterr().err.startswith(said)
+
+
 def test_a_folder_is_checked_as_it_is_run(study: Path, scans: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["check", str(study)]) == 0
     assert main(["check", str(scans)]) == 0
