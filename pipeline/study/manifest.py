@@ -30,7 +30,7 @@ from pipeline.ranges import Axis, Depth, Direction, Finite, NonNegative, Number,
 from pipeline.status import InputError, did_you_mean
 from pipeline.study.borrowed import borrowing_problems
 from pipeline.study.catheter import catheter_problems
-from pipeline.study.others import OthersText
+from pipeline.study.others import LONGEST_NAME, OthersText
 from pipeline.study.sources import MaskText, PathText, Sources, SourceText, Strict
 from pipeline.wording import WRITTEN_HERE, Place, as_toml, said, saying, sentences
 
@@ -53,7 +53,7 @@ def _not_written(value: Any, info: ValidationInfo) -> None:
 
 ONE_OF_THEM: JsonDict = {"type": "string", "$comment": "the name of one of [wires.*], in quotes"}
 FILLED_IN = BeforeValidator(_not_written), WithJsonSchema(WRITTEN_HERE)
-IDS: JsonDict = {"$comment": "up to 100 letters, digits and . _ -, a letter or a digit first"}
+IDS: JsonDict = {"$comment": f"up to {LONGEST_NAME} letters, digits and . _ -, a letter or a digit first"}
 ANOTHER: JsonDict = {"$comment": '"case:ID", with the id of another case'}
 LEAST_ACROSS_DEG = 5.0
 """Between material_axis and entry_direction: more than a clamp's direction is found to be off by."""
@@ -66,7 +66,7 @@ PerFrame = Annotated[tuple[Finite, ...], Field(min_length=1)]
 class Case(Strict):
     """One ``[[case]]`` table, an insertion: paths are resolved, the wire is looked up, everything is in LPS mm."""
 
-    id: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$", max_length=100, json_schema_extra=IDS)]
+    id: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$", max_length=LONGEST_NAME, json_schema_extra=IDS)]
     role: Literal["validation", "calibration"] = "validation"
     assumed: tuple[Annotated[str, Field(min_length=1, max_length=1000)], ...] = ()
     group: str = Field(default_factory=lambda data: data.get("id", ""), min_length=1, max_length=200)

@@ -93,6 +93,8 @@ def _there(text: str) -> bool:
         return False
 
 
+LONGEST_NAME = 100
+"""Most characters of a name that a folder is called after: an id of a case, a simulator."""
 NO_NAMES = ("nan", "na", "n.a", "null", "none")
 
 
@@ -104,6 +106,9 @@ def named(texts: Sequence[str]) -> dict[str, Path]:
         name = name if equals else Path(place).absolute().stem
         if not name.replace("-", "").replace("_", "").replace(".", "").isalnum() or name.lower() == "wireval":
             raise UsageError([f"--curves {text!r}: the name {name!r}: letters, digits, - . _, and not 'wireval'"])
+        if len(name) > LONGEST_NAME and _there(place):  # else the place is to be mended first
+            what = f"--curves {name[:20]}...: the name has {len(name)} characters"
+            raise UsageError([f"{what}; allowed: {LONGEST_NAME}; write NAME=PLACE with a shorter one"])
         if name.lower() in NO_NAMES:
             raise UsageError(
                 [f"--curves {text!r}: tables are often read so that {name!r} is no value; name it otherwise"]

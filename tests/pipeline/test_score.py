@@ -489,6 +489,18 @@ def test_names_that_a_disk_may_not_tell_apart_are_refused(names: tuple[str, ...]
         named([f"{name}=there" for name in names])
 
 
+def test_a_name_that_is_too_long_for_a_folder_is_refused_at_once(
+    known: Known, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The first simulator was computed, then the folder of the second could not be made."""
+    curves = write_csv(tmp_path / "one", known[1])
+    words = ["score", str(known[0]), "-o", str(tmp_path / "out"), "--curves", f"a={curves}", *QUICK]
+    assert main([*words, "--curves", f"{'x' * 101}={curves}"]) == 2
+    assert "...: the name has 101 characters; allowed: 100; write NAME=PLACE" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+    assert list(named([f"{'x' * 100}={curves}"])) == ["x" * 100]
+
+
 def script(name: str) -> str:
     found = re.search(rf"```python {name}\n(.*?)```", ADAPTERS.read_text(encoding="utf-8"), re.DOTALL)
     assert found is not None
