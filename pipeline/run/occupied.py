@@ -3,6 +3,7 @@
 import fcntl
 import os
 import platform
+import stat
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from datetime import UTC, datetime
@@ -36,15 +37,18 @@ def held(folder: Path, say: Callable[[str], None]) -> Iterator[None]:
 
 def owner_of(folder: Path) -> str:
     """Who works on a case at the moment; empty where nobody does."""
-    with suppress(OSError), (folder / FILE).open("r", encoding="utf-8") as file:
-        return "" if _lock(file, fcntl.LOCK_NB) else file.read() or "another run"
+    with suppress(OSError):
+        file = _opened(folder / FILE, os.O_RDONLY)
+        if file is not None:
+            with file:
+                return "" if _lock(file, fcntl.LOCK_NB) else file.read() or "another run"
     return ""
 
 
 def _locked(path: Path, say: Callable[[str], None]) -> TextIO:
     """The locked file; tried again where the run that held it before has removed the file meanwhile."""
     while True:
-        file = path.open("a+", encoding="utf-8")
+        file = _own(path)
         if not _lock(file, fcntl.LOCK_NB):
             file.seek(0)
             say(f"{file.read() or 'another run'} is at work on this case; waiting for it")
@@ -53,6 +57,27 @@ def _locked(path: Path, say: Callable[[str], None]) -> TextIO:
             if os.path.samestat(os.fstat(file.fileno()), path.stat()):
                 return file
         file.close()
+
+
+def _own(path: Path) -> TextIO:
+    """The file, open to be written; what else has its name (a link, a pipe, a user's file once more) loses it."""
+    while True:
+        if path.is_symlink():
+            path.unlink(missing_ok=True)
+        file = _opened(path, os.O_RDWR | os.O_CREAT | os.O_APPEND)
+        if file is not None:
+            return file
+        path.unlink(missing_ok=True)
+
+
+def _opened(path: Path, how: int) -> TextIO | None:
+    """A regular file, open; None for anything else, and for one with another name, under which it is somebody's."""
+    number = os.open(path, how | os.O_NONBLOCK | os.O_NOFOLLOW, 0o666)  # a pipe would block, a link leads anywhere
+    found = os.fstat(number)
+    if stat.S_ISREG(found.st_mode) and found.st_nlink <= 1:
+        return os.fdopen(number, "a+" if how & os.O_RDWR else "r", encoding="utf-8", errors="replace")
+    os.close(number)
+    return None
 
 
 def _lock(file: TextIO, how: int) -> bool:

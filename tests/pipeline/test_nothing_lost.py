@@ -517,6 +517,23 @@ def test_a_result_under_another_name_is_not_counted(out: Path, capsys: pytest.Ca
     assert "holds the result of case 'bifurcation'" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("how", ["a pipe", "a hard link", "a link"])
+def test_what_is_no_lock_is_neither_written_to_nor_waited_for(tmp_path: Path, how: str) -> None:
+    """Through another name of it a user's file was emptied, and told of the process."""
+    lock, precious, case = tmp_path / "case" / ".at-work", tmp_path / "precious", tmp_path / "case"
+    precious.write_text("precious", encoding="utf-8")
+    case.mkdir()
+    if how == "a pipe":
+        os.mkfifo(lock)
+    else:
+        (lock.hardlink_to if how == "a hard link" else lock.symlink_to)(precious)
+    assert owner_of(case) == ""
+    with held(case, print):
+        assert f"process {os.getpid()} on " in owner_of(case)
+    assert precious.read_text(encoding="utf-8") == "precious"
+    assert not lock.exists()
+
+
 def test_a_folder_where_a_lock_is_meant_is_named(tmp_path: Path) -> None:
     (tmp_path / ".at-work").mkdir()
     with pytest.raises(atomic.WriteError, match="Is a directory; remove this folder"), held(tmp_path, print):
