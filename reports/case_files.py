@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from reports import frames_file, tables
 from reports.frames_file import FrameArrays, ScanCrop
-from reports.records import read_json
+from reports.records import ALWAYS, read_json
+from reports.result_file import read_result
 from reports.schema import ERRORS, POINTS, TIMINGS
 from reports.texts import size_of
 
@@ -87,7 +88,7 @@ def read_case(folder: Path, points: bool = True, rest: bool = True) -> CaseFiles
     samples = tables.read_if_there(folder / POINTS.file, POINTS) if points else None
     timings = tables.read_if_there(folder / TIMINGS.file if rest else None, TIMINGS)
     scan, numbers = _frames(folder / "frames.h5", rest)
-    return CaseFiles(folder, read_json(folder / "result.json"), errors, samples, timings, scan, numbers)
+    return CaseFiles(folder, read_result(folder / "result.json"), errors, samples, timings, scan, numbers)
 
 
 def results_in(out_dir: Path) -> dict[str, dict[str, Any]]:
@@ -95,7 +96,7 @@ def results_in(out_dir: Path) -> dict[str, dict[str, Any]]:
     found: dict[str, dict[str, Any]] = {}
     for folder in find_cases(out_dir):
         try:
-            found[folder.name] = read_json(folder / "result.json")
+            found[folder.name] = read_result(folder / "result.json")
         except ValueError:
             found[folder.name] = {}
     return found
@@ -131,13 +132,18 @@ def not_run(out_dir: Path) -> list[str]:
 def amiss(folder: Path) -> str:
     """Which file of a finished case is missing or of another size than its ledger.json says; empty where none is.
 
-    Pages and views are drawn again and not asked for; contents are not read.
+    Pages and views are drawn again and not asked for; contents are not read. A case that crashed has no ledger.
     """
+    if not (folder / "ledger.json").exists():
+        return ""
     try:
         files = dict(read_json(folder / "ledger.json").get("files", {}))
         known = {str(n): int(entry["bytes"]) for n, entry in files.items() if "/" not in n and n != "report.html"}
     except (ValueError, TypeError, KeyError):
         return "ledger.json cannot be read"
+    for name in ALWAYS:
+        if name not in known:
+            return f"ledger.json does not name {name}"
     for name, expected in known.items():
         path = folder / name
         if not path.is_file():

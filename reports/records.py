@@ -17,6 +17,8 @@ HELD: dict[str, tuple[type[Any], ...]] = {
     "assumptions": (list, str), "argv": (list, str), "doubts": (list, str),
 }  # fmt: skip
 """What their keys hold: an object or a list, and what this consists of."""
+ALWAYS = ("result.json", "errors.csv", "frames.h5", "timings.csv", "provenance.json")
+"""The files of every case that went through the stages, however far and however well, that is of every ledger."""
 KEYS = {"sweep": ("parameter", "value", "unchanged"), "inputs": ("path", "sha256")}
 """What each object in such a list names."""
 

@@ -83,8 +83,10 @@ def clear(folder: Path) -> None:
     """Create a case's folder, or remove from it the files of an earlier result."""
     with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
-        for name in (ledger.FILE, *ledger.DATA, *ledger.PAGES):
+    for name in (ledger.FILE, *ledger.DATA, *ledger.PAGES):
+        with writing(folder / name):
             (folder / name).unlink(missing_ok=True)
+    with writing(folder):
         for path in folder.glob(".tmp-*"):  # of a run that was killed here: nobody else is at work in this folder
             path.unlink(missing_ok=True)
     for name in ("view", "figures"):
@@ -93,18 +95,22 @@ def clear(folder: Path) -> None:
 
 def finished(job: Job, key: str) -> bool:
     """Whether the result on disk is ok, has this key, and its data files are unchanged; pages may be missing."""
-    return _why_again(job, key) is None
+    return _why_again(job, lambda: key) is None
 
 
-def _why_again(job: Job, key: str) -> str | None:
-    """Why a case must be computed: None where it need not be, empty where the reason needs no words."""
+def _why_again(job: Job, key: Callable[[], str]) -> str | None:
+    """Why a case must be computed: None where it need not be, empty where the reason needs no words.
+
+    key : asked for where there is a ledger, since all scans are hashed for it.
+    """
     known = None if job.fresh else ledger.read(job.folder)
-    if known is None or known.key != key:
+    if job.fresh or not results.has_ended(job.folder) or (known is not None and known.key != key()):
         return ""
-    wrong = known.amiss(job.folder, known.data)
-    if wrong:
+    found = results.found_in(job.folder, mine=True)
+    if found.status == "damaged":
+        wrong, _, _ = str(found.failures[0]["message"]).rpartition("; ")
         return f"{wrong}: computed again"
-    return None if results.read_result(job.folder / ledger.RESULT).ok else ""
+    return None if found.ok else ""
 
 
 def run_case(job: Job) -> None:
@@ -112,10 +118,12 @@ def run_case(job: Job) -> None:
     progress = CaseProgress(job.label, job.folder / "log.txt", quiet=job.quiet, verbose=job.verbose)
     inputs = Inputs.of(job.case)
     with hashing(_files(job.case), job.cores) as hashed, held(job.folder, progress.warn):
-        again: str | None = ""
-        if not job.fresh and ledger.read(job.folder) is not None:
+
+        def key() -> str:
             hashed()
-            again = _why_again(job, job.key)
+            return job.key
+
+        again = _why_again(job, key)
         if again is None:
             _heal(job, progress)
             return

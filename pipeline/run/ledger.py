@@ -1,11 +1,13 @@
 """ledger.json: every file of a case's result with its size and hash, written last.
 
-A case is finished when its ledger exists and every file that it names is there and unchanged. The tables, curves and
-views are the data; the pages are drawn from them, so they can be drawn again without computing the case.
+A case is finished when its ledger exists, names what such a case always has, and all that it names is unchanged. The
+tables, curves and views are the data; the pages are drawn from them, so they can be drawn again without computing the
+case.
 """
 
 import hashlib
-from collections.abc import Iterator, Sequence
+import stat
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
@@ -13,7 +15,7 @@ from typing import Literal
 from pydantic import TypeAdapter
 
 from reports.atomic import write_bytes
-from reports.records import read_json
+from reports.records import ALWAYS, read_json
 from reports.schema import BUDGET, ENTRIES, ERRORS, POINTS, TIMINGS
 
 FILE = "ledger.json"
@@ -42,14 +44,21 @@ class Ledger:
     files: dict[str, Entry]
     pages: Pages = ""
 
-    def amiss(self, folder: Path, names: Sequence[str]) -> str:
-        """A sentence on the first of the named files that is not as it was written; empty where all are."""
+    def amiss(self, folder: Path, names: Iterable[str]) -> str:
+        """A sentence on the first of the named files that is not as it was written; empty where all are.
+
+        One that the ledger does not name was added, or its line was removed: neither is believed.
+        """
         for name in names:
             path, known = folder / name, self.files.get(name)
             if known is None:
+                if name in ALWAYS or (name in DATA and path.exists()):
+                    return f"{FILE} does not name {name}"
                 continue
             try:
-                if path.stat().st_size != known.bytes or entry_of(path) != known:
+                found = path.stat()
+                # a pipe is empty and would block
+                if not stat.S_ISREG(found.st_mode) or found.st_size != known.bytes or entry_of(path) != known:
                     return f"{name} is not as it was written"
             except FileNotFoundError:
                 return f"{name} is missing"

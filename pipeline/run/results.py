@@ -23,11 +23,11 @@ from pipeline.run.stages.known import Frame
 from pipeline.run.store import digest
 from pipeline.status import FrameStatus
 from pipeline.study.manifest import Case
-from reports import tables
+from reports import result_file, tables
 from reports.atomic import write_text
 from reports.case_files import GOOD, find_cases
-from reports.records import AGAIN, read_json
-from reports.schema import ERRORS
+from reports.records import AGAIN
+from reports.schema import ERRORS, POINTS
 
 LOST = {
     "crashed": "the case ended in an unexpected error; its log has the traceback",
@@ -121,35 +121,49 @@ RESULT = TypeAdapter(Result)
 
 def read_result(path: Path) -> Result:
     """Read a result.json, without its details; ValueError where it is not one."""
-    return RESULT.validate_python(read_json(path))
+    return RESULT.validate_python(result_file.read_result(path))
 
 
 def found_results(out: Path) -> list[Result]:
     """The result of every case below an output folder, by id; a damaged one is reported and hides no other."""
-    return [_found(folder) for folder in find_cases(out) if any((folder / name).exists() for name in COMPLETE)]
+    return [found_in(folder) for folder in find_cases(out) if has_ended(folder)]
 
 
-def _found(folder: Path) -> Result:
+def has_ended(folder: Path) -> bool:
+    """Whether a run of the case has ended, however."""
+    return any((folder / name).exists() for name in COMPLETE)
+
+
+def found_in(folder: Path, *, mine: bool = False) -> Result:
+    """The result of a case that has ended; a damaged one, whose failure says why, where it is not to be believed.
+
+    mine : whether the caller is at work on the case; then all of its data are looked at, not just what is scored.
+    """
     path, written = folder / ledger.RESULT, ledger.read(folder)
-    wrong = written.amiss(folder, ledger.SCORED) if written else ""
+    names = dict.fromkeys((*ledger.DATA, *written.data)) if written and mine else ledger.SCORED
+    wrong = written.amiss(folder, names) if written else ""
     altered = f"{folder}: {wrong}; run the case again" * bool(wrong)
     try:
         result = read_result(path)
     except ValueError as error:
         what = f"{path}: it is missing, or a key of it; {AGAIN}" if isinstance(error, ValidationError) else str(error)
         return lost(folder.name, "damaged", altered or what, frames=_planned(folder, written))
-    if altered:
-        return lost(folder.name, "damaged", altered, result)
+    why = altered or _unbelieved(folder, result, written, mine=mine)
+    return lost(folder.name, "damaged", why, result) if why else result
+
+
+def _unbelieved(folder: Path, result: Result, written: ledger.Ledger | None, *, mine: bool) -> str:
+    """Why a result whose files are as they were written is none of this case; empty where it is one."""
     if result.case != folder.name:
-        return lost(
-            folder.name, "damaged", f"{folder}: holds the result of case {result.case!r}; remove it or rename it so"
-        )
-    # a case that went through the stages has a key; while a run is still at work on it, its ledger may be missing
-    if written is None and result.key and not owner_of(folder):
-        return lost(
-            folder.name, "damaged", f"{folder}: {ledger.FILE} is missing or cannot be read; run the case again", result
-        )
-    return result
+        return f"{folder}: holds the result of case {result.case!r}; run the case again, or remove this folder"
+    # what went through the stages has a key, and a ledger, which may be missing while a run is still at work on it
+    if not result.key and result.status not in LOST:
+        return f"{folder}: {ledger.RESULT} has no key; run the case again"
+    if written is None and result.key and (mine or not owner_of(folder)):
+        return f"{folder}: {ledger.FILE} is missing or cannot be read; run the case again"
+    if written and POINTS.file not in written.files and result.summary.get("rms_mm") is not None:
+        return f"{folder}: {ledger.FILE} does not name {POINTS.file}; run the case again"
+    return ""
 
 
 def _planned(folder: Path, written: ledger.Ledger | None) -> int:

@@ -26,6 +26,7 @@ from pipeline.run import launch, ledger
 from pipeline.run.cache import Store
 from pipeline.run.occupied import held, owner_of
 from pipeline.run.outcome import Outcome
+from pipeline.run.results import found_in
 from pipeline.run.stages import STEPS, Context, Known
 from pipeline.status import InputError
 from pipeline.wireval import read_results
@@ -153,6 +154,121 @@ def test_tables_without_their_ledger_are_not_believed(
         assert main(["report", str(out), "--overview"]) == 0
     assert run(study, out) == 0
     assert differences(whole, out) == []
+
+
+def edited(path: Path, **changes: object) -> None:
+    """Change keys of a JSON file."""
+    path.write_text(json.dumps(json.loads(path.read_text(encoding="utf-8")) | changes), encoding="utf-8")
+
+
+def with_ledger(case: Path) -> None:
+    """Write the ledger of a case whose files were changed, as one would who wants them to be believed."""
+    known = ledger.read(case)
+    assert known is not None
+    ledger.write(case, known.key)
+
+
+def healed(study: Path, whole: Path, out: Path, said: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """The case counts as damaged for this reason, and the same command computes it again."""
+    assert main(["report", str(out), "--overview"]) == 1
+    assert f"bifurcation: {case_of(out)}{said}; " in capsys.readouterr().err
+    assert list(pd.read_csv(out / "summary.csv")["status"]) == ["damaged"]
+    assert run(study, out) == 0
+    assert f"{case_of(out)}{said}: computed again" in capsys.readouterr().err
+    assert differences(whole, out) == []
+
+
+@pytest.mark.parametrize("lost", [(), ("errors.csv",), ("points.csv.gz",)])
+def test_a_ledger_that_names_too_few_files_is_not_believed(
+    study: Path, whole: Path, out: Path, lost: tuple[str, ...], capsys: pytest.CaptureFixture[str]
+) -> None:
+    """With none of them named and the tables deleted all was ok, and nothing was made again."""
+    path = case_of(out) / "ledger.json"
+    files = json.loads(path.read_text(encoding="utf-8"))["files"]
+    edited(path, files={name: files[name] for name in files if name not in lost} if lost else {})
+    for name in lost or ("errors.csv", "points.csv.gz", "frames.h5"):
+        (case_of(out) / name).unlink()
+    healed(study, whole, out, f": ledger.json does not name {(*lost, 'result.json')[0]}", capsys)
+
+
+def test_a_table_that_the_ledger_does_not_name_is_not_believed(out: Path) -> None:
+    (case_of(out) / "budget.csv").write_text("input,u_mm", encoding="utf-8")
+    known = ledger.read(case_of(out))
+    assert known is not None
+    assert known.amiss(case_of(out), ledger.DATA) == "ledger.json does not name budget.csv"
+
+
+def test_a_result_without_key_and_ledger_is_not_believed(
+    study: Path, whole: Path, out: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It passed for one of a case that crashed, which has neither."""
+    (case_of(out) / "ledger.json").unlink()
+    edited(case_of(out) / "result.json", key="")
+    healed(study, whole, out, ": result.json has no key", capsys)
+
+
+@pytest.mark.parametrize("stage", ["load", "trace"])
+def test_a_case_that_was_to_end_early_is_whole_with_fewer_files(study: Path, tmp_path: Path, stage: str) -> None:
+    assert run(study, tmp_path, "--until", stage) == 0
+    assert found_in(case_of(tmp_path)).ok
+    before = (case_of(tmp_path) / "result.json").stat().st_mtime_ns
+    assert run(study, tmp_path, "--until", stage) == 0
+    assert (case_of(tmp_path) / "result.json").stat().st_mtime_ns == before
+
+
+@pytest.mark.parametrize("name", ["errors.csv", "view/scene.mrml"])
+def test_a_pipe_that_the_ledger_calls_empty_does_not_block(
+    study: Path, whole: Path, out: Path, name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    case = case_of(out)
+    spoil(case / name, "a pipe")
+    files = json.loads((case / "ledger.json").read_text(encoding="utf-8"))["files"]
+    edited(case / "ledger.json", files=files | {name: {"bytes": 0, "sha256": "0" * 64}})
+    assert main(["report", str(out), "--overview"]) == (name == "errors.csv")
+    assert run(study, out) == 0
+    assert f"{name} is not as it was written: computed again" in capsys.readouterr().err
+    assert differences(whole, out) == []
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"frames": "two"}, "summary.frames: got 'two'; expected a whole number from 0 on"),
+        ({"rms_mm": "=cmd|calc"}, "summary.rms_mm: got '=cmd|calc'; expected a number"),
+        ({"frames_ok": 99}, "summary.frames_ok: got 99; expected 2, the number of frames that are ok"),
+    ],
+)
+def test_a_result_that_no_case_has_is_damaged_and_computed_again(
+    study: Path, whole: Path, out: Path, change: dict[str, object], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Its ledger fitted it: errors of Python's own, or counts that were believed."""
+    path = case_of(out) / "result.json"
+    edited(path, summary=json.loads(path.read_text(encoding="utf-8"))["summary"] | change)
+    with_ledger(case_of(out))
+    with pytest.raises(InputError, match=re.escape(f"result.json: {said}")):
+        read_results(out)
+    assert main(["diff", str(whole), str(out)]) == 1
+    assert said in capsys.readouterr().out
+    healed(study, whole, out, f"/result.json: {said}", capsys)
+
+
+def test_a_result_of_another_case_is_computed_again(
+    study: Path, whole: Path, out: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It was kept, called damaged, and the advice was to do the same again."""
+    path = case_of(out) / "result.json"
+    edited(path, case="x", summary=json.loads(path.read_text(encoding="utf-8"))["summary"] | {"case": "x"})
+    with_ledger(case_of(out))
+    healed(study, whole, out, ": holds the result of case 'x'", capsys)
+
+
+def test_a_folder_in_the_place_of_a_file_is_named_and_not_the_case(
+    study: Path, out: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The advice was to remove the folder of the case."""
+    spoil(case_of(out) / "ledger.json", "a folder")
+    assert run(study, out) == 1
+    assert f"{case_of(out) / 'ledger.json'}: cannot be written: Is a directory; remove" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("how", ["altered", "gone"])

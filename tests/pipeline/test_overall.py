@@ -21,6 +21,7 @@ from reports import tables
 from reports.run_page import render_index
 from reports.schema import ERRORS, POINTS
 
+pytestmark = pytest.mark.usefixtures("invented")
 GOOD, BAD = 0.3, 5.0
 
 

@@ -22,6 +22,7 @@ from reports.schema import ERRORS, POINTS, SIMULATORS, SUMMARY, WHERE
 from reports.simulators import _where, in_common, render_simulators
 from reports.verdict import Doubt, verdict
 
+pytestmark = pytest.mark.usefixtures("invented")
 Array = NDArray[np.float64]
 Law = Callable[[Array, Array, np.random.Generator], Array]
 """Errors (n,) at distances from the tip (n,) and depths (n,)."""
@@ -313,6 +314,7 @@ def test_a_simulator_without_any_usable_wire_is_shown(tmp_path: Path) -> None:
         (folder / POINTS.file).unlink()
         result = json.loads((folder / "result.json").read_text(encoding="utf-8"))
         result["summary"] |= {"frames_ok": 0, "frames_failed": 4}
+        result["frames"] = [row | {"status": "curve_missing"} for row in result["frames"]]
         (folder / "result.json").write_text(json.dumps(result), encoding="utf-8")
     told = write_comparison(tmp_path, {"none": none, "wireval": ours})
     assert told == ["who is nearest where is left out: no frame counts for none"], "its figure was missing silently"

@@ -200,6 +200,7 @@ def _write_case(folder: Path, case: FakeCase, rows: list[dict[str, Any]], statis
         "group": "g1",
         "status": _status(case),
         "sentence": "two frames have no result" if case.failed else "every frame is ok",
+        "key": "key",
         "frames": [_frame_status(case, row) for row in rows],
         "failures": [_failure(case, frame) for frame in case.failed],
         "summary": {"case": case.name, "group": "g1", "role": case.role, "status": _status(case)}

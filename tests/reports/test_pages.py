@@ -225,7 +225,8 @@ def test_a_lumen_that_is_not_found_is_one_failure_not_one_a_frame(tmp_path: Path
     result = json.loads(path.read_text(encoding="utf-8"))
     told = {"case": "c", "stage": "segment", "status": "segment_failed", "sentence": "no lumen", "message": "grey"}
     frames = [row | told for row in result["frames"]]
-    changed = result | {"status": "segment_failed", "frames": frames, "failures": [told]}
+    summary = result["summary"] | {"status": "segment_failed", "frames_ok": 0}
+    changed = result | {"status": "segment_failed", "frames": frames, "failures": [told], "summary": summary}
     path.write_text(json.dumps(changed), encoding="utf-8")
     page = render_case(path.parent).read_text(encoding="utf-8")
     assert "Failures: 1 case<" in page
