@@ -101,7 +101,24 @@ def read_text(path: Path, most: int = TEXT_BYTES) -> str:
 def read_json(path: Path, what: str) -> Any:
     """The content of a JSON file. what : it should be, in words."""
     text = read_text(path)
-    return _parsed(path, lambda: json.loads(text), lambda _: f"{path}: no JSON; expected {what}; write it again")
+
+    def refusal(error: Exception) -> str:
+        return f"{path}: {error if isinstance(error, TwiceError) else 'no JSON'}; expected {what}; write it again"
+
+    return _parsed(path, lambda: json.loads(text, object_pairs_hook=_once), refusal)
+
+
+class TwiceError(ValueError):
+    """A key that stands twice in one object, of which a parser keeps the last."""
+
+
+def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """An object of JSON; TwiceError where a key stands twice with two values."""
+    found: dict[str, Any] = {}
+    for key, value in pairs:
+        if found.setdefault(key, value) != value:
+            raise TwiceError(f"two values of the key {key[:40]!r}")
+    return found
 
 
 def read_toml(path: Path) -> dict[str, Any]:

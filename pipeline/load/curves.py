@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pipeline.load.chain import one_chain
 from pipeline.load.geometry import refused, unusable
 from pipeline.load.guard import reachable, read_json, read_text, told
-from pipeline.load.outside import millimetres
+from pipeline.load.outside import millimetres, to_number
 from pipeline.load.stated import stated_in
 from pipeline.load.surfaces import RAS_TO_LPS, read_vtp
 from pipeline.model import Array, Curve
@@ -43,8 +43,15 @@ def positions_of(path: Path, markup: dict[str, Any]) -> NDArray[np.float64]:
     if system not in SYSTEMS:
         raise refused(path, f"coordinateSystem {system!r}", "LPS or RAS", "save the curve again")
     factor = millimetres(path, str(markup.get("coordinateUnits", "mm")))
+    placed = [p for p in markup["controlPoints"] if isinstance(p, dict)]
+    unplaced = [n for n, p in enumerate(placed) if p.get("positionStatus", "defined") != "defined"]
+    if unplaced:
+        got = f"{len(unplaced)} control points that are not placed, the first is {unplaced[0]}"
+        raise refused(path, got, "defined positions", "place or delete them and save the curve again")
     with told(path):
-        points = np.array([p["position"] for p in markup["controlPoints"]], dtype=float).reshape(-1, 3)
+        points = np.array([p["position"] for p in markup["controlPoints"]])
+    if points.ndim != 2 or points.shape[1] != 3 or points.dtype.kind not in "iuf":
+        raise refused(path, "control points that are not three numbers", "positions [x, y, z]", "save the curve again")
     return reachable(path, points * SYSTEMS[system] * factor)
 
 
@@ -80,8 +87,8 @@ def read_csv_points(path: Path) -> NDArray[np.float64]:
         raise unusable(path, f"has {len(head)} columns without names; expected x, y, z; name them above the table")
     try:
         if columns is None:
-            return np.array([[float(r[c]) for c in range(3)] for r in rows]).reshape(-1, 3)
-        return np.array([[float(r[c]) for c in columns] for r in rows[1:]]).reshape(-1, 3)
+            return np.array([[to_number(r[c]) for c in range(3)] for r in rows]).reshape(-1, 3)
+        return np.array([[to_number(r[c]) for c in columns] for r in rows[1:]]).reshape(-1, 3)
     except (ValueError, IndexError) as error:
         allowed = "columns x_mm, y_mm, z_mm of numbers"
         raise refused(path, f"{error} (header {head})", allowed, "name the columns") from error
@@ -89,7 +96,7 @@ def read_csv_points(path: Path) -> NDArray[np.float64]:
 
 def _is_number(text: str) -> bool:
     try:
-        float(text)
+        to_number(text)
     except ValueError:
         return False
     return True
@@ -131,9 +138,13 @@ def read_truth(path: Path, frame_count: int | None) -> list[Array]:
     expected = '{"frames": [{"points_mm": [[x, y, z], ...]}]}'
     found = read_json(path, expected)
     try:
-        curves = [np.array(frame["points_mm"], dtype=np.float64) for frame in found["frames"]]
+        curves = [np.array(frame["points_mm"]) for frame in found["frames"]]
     except (ValueError, KeyError, TypeError, IndexError):
         raise unusable(path, f"cannot be read as truth; expected {expected}") from None
+    texts = [n for n, curve in enumerate(curves) if curve.size and curve.dtype.kind not in "iuf"]
+    if texts:
+        raise unusable(path, f"frame {texts[0]} holds something else than numbers; expected {expected}")
+    curves = [curve.astype(np.float64) for curve in curves]
     frame_count = len(curves) if frame_count is None else frame_count
     if len(curves) != frame_count or any(c.ndim != 2 or c.shape[1] != 3 for c in curves):
         raise unusable(path, f"holds {len(curves)} curves, expected {frame_count} of shape (n, 3), one per frame")

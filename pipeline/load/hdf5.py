@@ -27,6 +27,7 @@ def _volumes(file: h5py.File, source: Source) -> list[h5py.Dataset]:
     node = _inside(file, source.dataset or "/volume", source)
     if isinstance(node, h5py.Group):
         inside = [_inside(node, name, source) for name in sorted(node, key=natural_key)]
+        _require_volumes(node, inside, source)
         found = [item for item in inside if isinstance(item, h5py.Dataset) and item.ndim == 3]
         if found:
             return found
@@ -36,6 +37,21 @@ def _volumes(file: h5py.File, source: Source) -> list[h5py.Dataset]:
     file.visititems(lambda name, item: held.append(f"/{name} {item.shape}") if isinstance(item, h5py.Dataset) else None)
     none = f"no volume {source.dataset or '/volume'!r}; the file holds {', '.join(held[:MOST_NAMES]) or 'none'}. "
     raise unusable(source.path, none + "Name a 3-D or 4-D dataset, or a group of 3-D ones, as FILE.h5#/name.")
+
+
+def _require_volumes(group: h5py.Group, inside: list[Any], source: Source) -> None:
+    """LoadError where a member that may be meant for a volume is none: those beside it would be taken for all frames.
+
+    Groups and datasets of one axis, as of depths, may stand beside volumes.
+    """
+    for name, item in zip(sorted(group, key=natural_key), inside, strict=True):
+        if item is None:
+            what = "a link to nothing"
+        elif isinstance(item, h5py.Dataset) and item.ndim in (2, 4):
+            what = f"a dataset of the shape {item.shape}"
+        else:
+            continue
+        raise unusable(source, f"{group.name}/{name} is {what}; allowed: 3-D datasets, one a frame; remove or mend it")
 
 
 def _inside(group: h5py.Group, name: str, source: Source) -> Any:
@@ -106,6 +122,9 @@ def _header(source: Source, data: h5py.Dataset, config: LoadConfig) -> Header:
     require_room(source, volume_bytes, 0, "", config.most_gib)
     if stored == 0 or (data.chunks is None and stored < total):
         raise unusable(source, f"{data.name}: {stored} of {total} bytes were ever written; write it again")
+    if data.chunks is not None and (there := data.id.get_num_chunks()) < (need := _chunks_of(data)):
+        # what was not written reads as zeros: a scan that ends in air
+        raise unusable(source, f"{data.name}: {there} of {need} chunks were ever written; write it again")
     if data.chunks is not None:
         require_room(source, total, stored, "deflate", config.most_gib)
     defaults = {"origin_mm": "0, 0, 0", "direction": "along x, y, z"}
@@ -119,6 +138,11 @@ def _header(source: Source, data: h5py.Dataset, config: LoadConfig) -> Header:
         str(data.dtype.newbyteorder("=")),
         assumed=tuple(f"{source.path.name}: {data.name} lacks {text} assumed" for text in missing),
     )
+
+
+def _chunks_of(data: h5py.Dataset) -> int:
+    """How many chunks a whole dataset has."""
+    return int(np.prod([-(-n // chunk) for n, chunk in zip(data.shape, data.chunks, strict=True)], dtype=object))
 
 
 def _numbers(source: Source, data: h5py.Dataset, name: str, default: NDArray[Any]) -> NDArray[np.float64]:

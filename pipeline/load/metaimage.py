@@ -33,10 +33,10 @@ def head_of(path: Path) -> Head:
     kind = tags.get("ElementType", "").removesuffix("_ARRAY")
     if kind not in TYPES:
         raise unusable(path, f"ElementType = {kind!r}; allowed: {', '.join(TYPES)}")
-    packing = "deflate" if tags.get("CompressedData", "False") == "True" else ""
-    if not packing and tags.get("BinaryData", "True") != "True":
+    packing = "deflate" if _flag(path, tags, "CompressedData") else ""
+    if not packing and not _flag(path, tags, "BinaryData", missing="True"):
         packing = "ascii"
-    swapped = "True" in (tags.get("BinaryDataByteOrderMSB"), tags.get("ElementByteOrderMSB"))
+    swapped = any(_flag(path, tags, name) for name in ("BinaryDataByteOrderMSB", "ElementByteOrderMSB"))
     stored = np.dtype((">" if swapped else "<") + TYPES[kind])
     channels = int(numbers(path, tags, "ElementNumberOfChannels", 1, whole=True, missing="1")[0])
     files = _files(path, tags["ElementDataFile"], below, shape[2] * items)
@@ -46,6 +46,8 @@ def head_of(path: Path) -> Head:
         float(numbers(path, tags, f"ElementToIntensityFunction{name}", 1, missing=text)[0])
         for name, text in (("Slope", "1"), ("Offset", "0"))
     )
+    if packing == "deflate":
+        _require_packed(path, tags, parts)
     geometry, assumed = _geometry(path, tags, count)
     return Head(
         path, shape, stored, parts, *geometry, packing=packing, items=items, channels=channels, slope=slope,
@@ -61,12 +63,33 @@ def _tags(path: Path) -> tuple[dict[str, str], str, int]:
     end = start.find(b"\n", key) + 1
     if key < 0 or not end:
         raise unusable(path, "cannot read it as MetaImage: no line ElementDataFile; check that the file is complete")
-    lines = _text(start[:end]).splitlines()
-    return (
-        {key.strip(): value.strip() for key, _, value in (line.partition("=") for line in lines)},
-        _text(start[end:]),
-        end,
-    )
+    tags: dict[str, str] = {}
+    for line in _text(start[:end]).splitlines():
+        name, _, value = (part.strip() for part in line.partition("="))
+        if tags.setdefault(name, value) != value:
+            both = f"{name} = {tags[name][:40]} and {name} = {value[:40]}"
+            raise unusable(path, f"the header says {both}; allowed: one of them; correct the header")
+    return tags, _text(start[end:]), end
+
+
+def _flag(path: Path, tags: dict[str, str], name: str, missing: str = "False") -> bool:
+    """True or False of a tag; as in MetaIO the first letter tells, or 1 and 0."""
+    text = tags.get(name, missing)
+    if text[:1] not in ("T", "t", "1", "F", "f", "0"):
+        raise unusable(path, f"{name} = {text[:40]!r}; allowed: True, False; correct the header")
+    return text[0] in "Tt1"
+
+
+def _require_packed(path: Path, tags: dict[str, str], parts: tuple[tuple[Path, int], ...]) -> None:
+    """LoadError where more packed data follow than the header says; 0 says nothing.
+
+    Fewer, of a file that was cut short, are found when it is read: that costs its frame, not the study.
+    """
+    said = int(numbers(path, tags, "CompressedDataSize", 1, whole=True, missing="0")[0])
+    there = sum(size_of(name) - begin for name, begin in parts)
+    if 0 < said < there:
+        why = f"CompressedDataSize = {said}, and {there} bytes follow to unpack; allowed: as many"
+        raise unusable(path, f"{why}; the header is not its own: write the file again")
 
 
 def _text(part: bytes) -> str:

@@ -22,12 +22,14 @@ AGREE_VOXELS = 0.1
 RIGHT_ANGLES = 1e-3
 """Cosine between axes up to which a form's matrix is a rotation written with few digits, not a shear."""
 _FIRST = {
-    "size": ("i4", 0), "dim": ("8i2", 40), "datatype": ("i2", 70), "pixdim": ("8f4", 76), "vox_offset": ("f4", 108),
+    "size": ("i4", 0), "dim": ("8i2", 40), "datatype": ("i2", 70), "bitpix": ("i2", 72), "pixdim": ("8f4", 76),
+    "vox_offset": ("f4", 108),
     "slope": ("f4", 112), "intercept": ("f4", 116), "units": ("u1", 123), "qform": ("i2", 252), "sform": ("i2", 254),
     "quatern": ("3f4", 256), "qoffset": ("3f4", 268), "srow": ("12f4", 280), "magic": ("S4", 344),
 }  # fmt: skip
 _SECOND = {
-    "size": ("i4", 0), "magic": ("S4", 4), "datatype": ("i2", 12), "dim": ("8i8", 16), "pixdim": ("8f8", 104),
+    "size": ("i4", 0), "magic": ("S4", 4), "datatype": ("i2", 12), "bitpix": ("i2", 14), "dim": ("8i8", 16),
+    "pixdim": ("8f8", 104),
     "vox_offset": ("i8", 168), "slope": ("f8", 176), "intercept": ("f8", 184), "qform": ("i4", 344),
     "sform": ("i4", 348), "quatern": ("3f8", 352), "qoffset": ("3f8", 376), "srow": ("12f8", 400), "units": ("i4", 500),
 }  # fmt: skip
@@ -61,6 +63,10 @@ def head_of(path: Path) -> Head | None:
     kind = TYPES.get(int(fields["datatype"]))
     if kind is None:
         raise unusable(path, f"datatype {int(fields['datatype'])}; allowed: {sorted(TYPES)} (grey values); convert it")
+    bits = 8 * np.dtype(kind).itemsize
+    if int(fields["bitpix"]) not in (0, bits):
+        why = f"bitpix {int(fields['bitpix'])} and datatype {int(fields['datatype'])}, which has {bits}"
+        raise unusable(path, f"the header says {why}; allowed: the same; correct the header")
     data = path_of_head if whole else other_half(path_of_head)
     begin = float(fields["vox_offset"])
     if not np.isfinite(begin) or begin != int(begin) or not (int(fields["size"]) + 4 if whole else 0) <= begin < 2**40:
@@ -73,7 +79,9 @@ def head_of(path: Path) -> Head | None:
     else:
         shift = 0
     slope, intercept = float(fields["slope"]), float(fields["intercept"])
-    used = (slope, intercept) if slope not in (0.0,) and np.isfinite(slope) else (1.0, 0.0)
+    used = (1.0, 0.0) if slope == 0.0 or np.isnan(slope) else (slope, intercept)  # 0 and NaN: stored as they are
+    if not np.all(np.isfinite(used)):
+        raise unusable(path, f"scl_slope {slope:g} and scl_inter {intercept:g}; allowed: finite; correct the header")
     return Head(
         path, shape, np.dtype(kind).newbyteorder(order), ((data, int(begin)),), spacing, origin, direction,
         packing=packing, before=shift, items=items, slope=used[0], intercept=used[1], assumed=assumed,
@@ -115,6 +123,10 @@ def _geometry(path: Path, fields: Any, shape: NDArray[Any]) -> tuple[Placed, tup
     forms = {}
     if int(fields["sform"]) > 0:
         forms["sform"] = np.array(fields["srow"], float).reshape(3, 4)
+        if not np.all(np.isfinite(forms["sform"])):
+            raise unusable(
+                path, "its sform (axes and origin, srow) is not finite; allowed: twelve numbers; correct the header"
+            )
     if int(fields["qform"]) > 0:
         forms["qform"] = _of_quaternion(path, fields, pixdim)
     used = next((f for f in forms.values() if _is_rigid(f)), next(iter(forms.values()), None))

@@ -28,14 +28,33 @@ def millimetres(what: object, unit: str) -> float:
     return UNITS_MM[name]
 
 
+WRITTEN = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?|[+-]?(?:nan|inf|infinity)", re.IGNORECASE)
+"""A number as programs write it: Python also takes 1_2.5 for 12.5, and digits of other scripts."""
+
+
+def to_number(text: str) -> float:
+    """A number of a table or a header; ValueError for anything else."""
+    if not WRITTEN.fullmatch(text.strip()):
+        raise ValueError(f"{text[:40]!r} is no number")
+    return float(text)
+
+
+def to_whole(text: str) -> int:
+    """A whole number of a header; ValueError for anything else."""
+    if not text.isascii() or not text.lstrip("+-").isdigit():
+        raise ValueError(f"{text[:40]!r} is no whole number")
+    return int(text)
+
+
 def numbers(
     what: object, tags: Mapping[str, str], name: str, count: int, *, whole: bool = False, missing: str | None = None
 ) -> NDArray[np.float64]:
     """``count`` finite numbers of a header's field."""
     text = tags.get(name, missing)
     words = (text or "").split()
+    read = to_whole if whole else to_number
     try:
-        values = np.array([int(w) if whole else float(w) for w in words], float)
+        values = np.array([read(word) for word in words], float)
     except (ValueError, OverflowError):
         values = np.zeros(0)
     if len(values) != count or not np.all(np.isfinite(values)) or (whole and np.abs(values).max(initial=0) > 2**53):

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from pipeline.load.geometry import refused
 from pipeline.load.guard import reachable, read_bytes, told
+from pipeline.load.outside import to_number
 from pipeline.model import Shapes
 from reports.texts import TEXT_BYTES
 
@@ -81,7 +82,7 @@ class _Vtp:
         kind = np.dtype(self.header[0] + _TYPES[str(node.get("type"))])
         form = node.get("format")
         if form == "ascii":
-            return np.array((node.text or "").split(), dtype=float).astype(kind)
+            return np.array([to_number(word) for word in (node.text or "").split()], dtype=float).astype(kind)
         tail = (node.text or "").encode() if form == "binary" else self.tail[int(node.get("offset", "0")) :]
         raw = form != "binary" and self.encoding == "raw"
         return np.frombuffer(self._payload(tail if raw else self._decoded(tail)), kind)
@@ -101,16 +102,21 @@ class _Vtp:
         size = struct.calcsize(self.header)
         first = struct.unpack(self.header, data[:size])[0]
         if not self.compressed:
+            if len(data) < size + first:
+                raise ValueError("cut short")
             return data[size : size + first]
         sizes = struct.unpack_from(f"{self.header[0]}{first}{self.header[1]}", data, 3 * size)
         ends = (3 + first) * size + np.cumsum([0, *sizes])
         blocks = []
         for a, b in itertools.pairwise(ends):
-            blocks.append(zlib.decompressobj().decompress(data[a:b], self.room + 1))
+            unpack = zlib.decompressobj()
+            blocks.append(unpack.decompress(data[a:b], self.room + 1))
             self.room -= len(blocks[-1])
             if self.room < 0:
                 got = f"arrays that unpack to more than {MOST_UNPACKED / 2**20:.0f} MiB"
                 raise refused(self.path, got, "less", "make the surface coarser, or save it uncompressed")
+            if not unpack.eof:
+                raise ValueError("cut short")
         return b"".join(blocks)
 
 
@@ -120,6 +126,7 @@ def _cells(file: _Vtp, piece: ET.Element, kind: str, count: int) -> list[NDArray
         return []
     arrays = {str(a.get("Name")): file.array(a).astype(np.int64) for a in node.findall("DataArray")}
     corners, ends = (arrays.get(name, np.zeros(0, np.int64)) for name in ("connectivity", "offsets"))
+    _require_count(file.path, piece, kind, len(ends))
     return split_cells(file.path, kind, corners, ends, count)
 
 
@@ -138,15 +145,30 @@ def split_cells(
     return [c for c in np.split(corners, ends[:-1]) if len(c)]
 
 
+def _piece(path: Path, file: _Vtp) -> tuple[ET.Element, ET.Element]:
+    """The one piece of a file that has points, and these; LoadError for none, and for several."""
+    pieces = [p for p in file.root.findall("./PolyData/Piece") if p.get("NumberOfPoints") != "0"]
+    node = pieces[0].find("./Points/DataArray") if pieces else None
+    if node is None or len(pieces) > 1:
+        got = "no PolyData piece with points" if node is None else f"{len(pieces)} pieces with points"
+        raise refused(path, got, "one <Piece> of <PolyData>", "export as PolyData, in one piece")
+    return pieces[0], node
+
+
+def _require_count(path: Path, piece: ET.Element, what: str, there: int) -> None:
+    """LoadError where a piece holds another number of points or cells than it says."""
+    said = piece.get(f"NumberOf{what}", str(there))
+    if said != str(there):
+        raise refused(path, f"{there} {what} where NumberOf{what} says {said}", "as many", "copy the file again")
+
+
 def read_vtp(path: Path) -> Shapes:
     """Points, lines and triangles (polygons are fanned) of a .vtp file. Raises LoadError for any other content."""
     with told(path):
         file = _Vtp(path)
-        piece = file.root.find("./PolyData/Piece")
-        node = None if piece is None else piece.find("./Points/DataArray")
-        if piece is None or node is None:
-            raise refused(path, "no PolyData piece with points", "one <Piece> of <PolyData>", "export as PolyData")
+        piece, node = _piece(path, file)
         points = reachable(path, to_lps(file.head, file.array(node).astype(np.float64).reshape(-1, 3)))
+        _require_count(path, piece, "Points", len(points))
         fans = [
             np.stack([np.full(len(p) - 2, p[0]), p[1:-1], p[2:]], axis=1)
             for p in _cells(file, piece, "Polys", len(points))

@@ -147,7 +147,15 @@ def _text(head: Head, item: int, box: Box) -> NDArray[Any]:
         words = file.read().split()
     if len(words) != count:
         raise unusable(head.path, f"{len(words)} numbers are written out, the header asks for {count}; copy it again")
-    values = np.array(words, float).astype(head.kind.newbyteorder("="))
+    values, kind = np.array(words, float), head.kind.newbyteorder("=")
+    bounds = np.iinfo(kind) if kind.kind in "iu" else np.finfo(kind)
+    bad = ~((values >= bounds.min) & (values <= bounds.max))
+    if kind.kind in "iu":
+        bad |= values != np.rint(values)
+    if bad.any():
+        allowed = f"{'whole ' * (kind.kind in 'iu')}numbers from {bounds.min} to {bounds.max}, as its type says"
+        raise unusable(head.path, f"voxels of {values[bad][0]:g} are written out; allowed: {allowed}; save it again")
+    values = values.astype(kind)
     whole = values.reshape(head.items, *head.shape[::-1], head.channels)[item, ..., 0].T
     return whole[tuple(slice(a, b) for a, b in zip(*box, strict=True))]
 

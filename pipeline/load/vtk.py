@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from pipeline.load.chain import one_chain
 from pipeline.load.geometry import refused
 from pipeline.load.guard import read_bytes
+from pipeline.load.outside import to_number
 from pipeline.load.surfaces import split_cells, to_lps
 from pipeline.model import Array
 
@@ -34,11 +35,23 @@ class _Legacy:
         return self.raw[at + len(mark) : end].decode("latin-1").split(), end + 1
 
     def array(self, start: int, count: int, kind: str) -> NDArray[np.float64]:
-        """``count`` numbers from byte ``start`` on; kind : their VTK type, which matters in binary files."""
+        """``count`` numbers from byte ``start`` on; kind : their VTK type, which matters in binary files.
+
+        LoadError where there are fewer, as in a file that was cut short.
+        """
         if self.binary:
-            return np.frombuffer(self.raw, _TYPES[kind], count, start).astype(np.float64)
-        words = self.raw[start:].split(None, count)[:count]
-        return np.array(words, dtype=np.float64)
+            there = (len(self.raw) - start) // np.dtype(_TYPES[kind]).itemsize
+        else:
+            words = self.raw[start:].split(None, count)[:count] if count > 0 else []
+            there = len(words)
+        if not 0 <= count <= there:
+            got = f"{there} numbers where its head says {count}"
+            raise refused(self.path, got, "as many", "copy the file again, or export the wire as .csv")
+        return np.frombuffer(self.raw, _TYPES[kind], count, start).astype(np.float64) if self.binary else _plain(words)
+
+
+def _plain(words: list[bytes]) -> NDArray[np.float64]:
+    return np.array([to_number(word.decode("ascii")) for word in words], dtype=np.float64)
 
 
 def read_vtk_points(path: Path) -> Array:
@@ -48,8 +61,9 @@ def read_vtk_points(path: Path) -> Array:
     try:
         points = file.array(start, 3 * int(head[0]), head[1]).reshape(-1, 3)
         cells = _lines(file, len(points))
-    except (IndexError, KeyError, ValueError) as error:
-        raise refused(path, f"{error!r} in POINTS or LINES", "a polyline", "export the wire as .csv or .vtp") from None
+    except (IndexError, KeyError, ValueError):
+        got = "something else than numbers in POINTS or LINES"
+        raise refused(path, got, "a polyline", "export the wire as .csv or .vtp") from None
     return to_lps(file.raw, one_chain(path, points, cells) if cells else points)
 
 
@@ -64,8 +78,11 @@ def _lines(file: _Legacy, count: int) -> list[NDArray[np.int64]]:
         kind, place = file.after("CONNECTIVITY ")
         corners = file.array(place, int(head[1]), kind[0]).astype(np.int64)
         return split_cells(file.path, "LINES", corners, ends, count)
-    rest, cells = file.array(start, int(head[1]), "int").astype(np.int64), []
+    rest, cells = file.array(start, int(head[1]), "int").astype(np.int64), list[NDArray[np.int64]]()
     for _ in range(int(head[0])):
+        if not len(rest):
+            got = f"{len(cells)} lines where its head says {head[0]}"
+            raise refused(file.path, got, "as many", "copy the file again, or export the wire as .csv")
         cells.append(rest[1 : rest[0] + 1])
         rest = rest[rest[0] + 1 :]
     corners = np.concatenate([np.zeros(0, np.int64), *cells])

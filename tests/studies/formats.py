@@ -467,7 +467,9 @@ FULL = False
 
 
 def variants() -> list[Variant]:
-    each = (itk_variants, meta_variants, nrrd_variants, nifti_variants, hdf5_variants, other_variants)
+    from tests.studies.format_contradictions import contradictions
+
+    each = (contradictions, itk_variants, meta_variants, nrrd_variants, nifti_variants, hdf5_variants, other_variants)
     found = [variant for make in each for variant in make()]
     for name, write, want, more in dicom_variants(enhanced, numbered(), SPACING, ORIGIN):
         found.append(Variant(name, write, want, **({"direction": np.eye(3)} | more)))

@@ -1,0 +1,145 @@
+"""Curves that are not all there, or say two things: what a reader makes of them is a wire, but not the one meant."""
+
+from __future__ import annotations
+
+import base64
+import json
+import struct
+import zlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline.load import LoadError
+from pipeline.load.curves import read_curve, read_truth
+from pipeline.load.vtk import read_vtk_points
+
+POINTS = np.column_stack([np.zeros(6), np.zeros(6), np.arange(6.0)])
+WORDS = " ".join(f"{value:g}" for value in POINTS.ravel())
+HEAD = "# vtk DataFile Version 3.0\nwire\nASCII\nDATASET POLYDATA\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (f"POINTS 9 double\n{WORDS}\n", "got 18 numbers where its head says 27"),
+        ("POINTS -1 double\n\n", "where its head says -3"),
+        (f"POINTS 99999999999999 double\n{WORDS}\n", "got 18 numbers"),
+        (f"POINTS 6 double\n{WORDS}\nLINES 999999999 7\n6 0 1 2 3 4 5\n", "got 1 lines where its head says 999999999"),
+        (f"POINTS 6 double\n{WORDS.replace('5', '1_5')}\n", "something else than numbers"),
+    ],
+)
+def test_a_legacy_file_holds_what_its_head_says(tmp_path: Path, text: str, said: str) -> None:
+    """One that was cut short at the end of a line was scored, ok."""
+    path = tmp_path / "wire.vtk"
+    path.write_text(HEAD + text, encoding="utf-8")
+    with pytest.raises(LoadError, match=said):
+        read_vtk_points(path)
+
+
+def vtp(points: str, *, count: int = 6, form: str = "ascii", compressor: str = "") -> str:
+    """A .vtp file of points alone."""
+    data = f'<DataArray type="Float64" NumberOfComponents="3" format="{form}">{points}</DataArray>'
+    piece = f'<Piece NumberOfPoints="{count}" NumberOfLines="0"><Points>{data}</Points></Piece>'
+    head = f'<VTKFile type="PolyData" byte_order="LittleEndian" header_type="UInt32"{compressor}>'
+    return f"{head}<PolyData>{piece}</PolyData></VTKFile>"
+
+
+def packed(cut: int) -> str:
+    """The points in one block of zlib, short of so many bytes."""
+    block = zlib.compress(POINTS.tobytes())[: -cut or None]
+    head = struct.pack("<4I", 1, POINTS.nbytes, 0, len(block))
+    return (base64.b64encode(head) + base64.b64encode(block)).decode()
+
+
+def coded(said: int) -> str:
+    """The points in base64, whose length is said to be so many bytes."""
+    return base64.b64encode(struct.pack("<I", said) + POINTS.tobytes()).decode()
+
+
+ZLIB = ' compressor="vtkZLibDataCompressor"'
+TWICE = vtp(WORDS).replace("</Piece>", "</Piece>" + vtp(WORDS).partition("<PolyData>")[2].partition("</PolyData>")[0])
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (vtp(WORDS), ""),
+        (vtp(coded(144), form="binary"), ""),
+        (vtp(packed(0), form="binary", compressor=ZLIB), ""),
+        (vtp(WORDS, count=9), "got 6 Points where NumberOfPoints says 9"),
+        (vtp(coded(240), form="binary", count=10), "contradicts its format"),
+        (vtp(packed(4), form="binary", compressor=ZLIB), "contradicts its format"),
+        (TWICE, "got 2 pieces with points"),
+        (vtp(WORDS.replace("5", "1_5")), "contradicts its format"),
+    ],
+)
+def test_a_polydata_file_holds_what_it_says(tmp_path: Path, text: str, said: str) -> None:
+    """Counts, lengths and further pieces were not looked at."""
+    path = tmp_path / "wire.vtp"
+    path.write_text(text, encoding="utf-8")
+    if said:
+        with pytest.raises(LoadError, match=said):
+            read_curve(path)
+    else:
+        np.testing.assert_array_equal(read_curve(path).points_mm, POINTS)
+
+
+@pytest.mark.parametrize(
+    ("positions", "status", "said"),
+    [
+        (POINTS.reshape(3, 6).tolist(), "defined", "not three numbers"),
+        (POINTS.reshape(9, 2).tolist(), "defined", "not three numbers"),
+        ([[str(value) for value in point] for point in POINTS.tolist()], "defined", "not three numbers"),
+        (POINTS.tolist(), "undefined", "6 control points that are not placed, the first is 0"),
+    ],
+)
+def test_control_points_are_placed_and_have_three_numbers(
+    tmp_path: Path, positions: list[object], status: str, said: str
+) -> None:
+    """Six numbers in each were two points, and what was never placed lay at 0, 0, 0."""
+    points = [{"position": position, "positionStatus": status} for position in positions]
+    path = tmp_path / "wire.mrk.json"
+    path.write_text(json.dumps({"markups": [{"type": "Curve", "controlPoints": points}]}), encoding="utf-8")
+    with pytest.raises(LoadError, match=said):
+        read_curve(path)
+
+
+@pytest.mark.parametrize(
+    ("head", "row", "said"),
+    [
+        ("# space: RAS\n# space: LPS\nx,y,z\n", "0,0,5", "got LPS and RAS in the lines above its table"),
+        ("# unit: m\nx_mm,y_mm,z_mm\n", "0,0,5", "got m and mm in the lines above its table, or its columns"),
+        ("# unit: mm\nx_mm,y_mm,z_mm\n", "0,0,5", ""),
+        ("x_mm,y_mm,z_mm\n", "0,0,1_2.5", "'1_2.5' is no number"),
+        ("x_mm,y_mm,z_mm\n", "0,0,\N{FULLWIDTH DIGIT FIVE}", "is no number"),
+    ],
+)
+def test_a_table_says_one_thing_in_plain_digits(tmp_path: Path, head: str, row: str, said: str) -> None:
+    """Of two spaces the first was taken, 8.8 mm off."""
+    path = tmp_path / "wire.csv"
+    path.write_text(f"{head}0,0,0\n0,0,1\n{row}\n", encoding="utf-8")
+    if said:
+        with pytest.raises(LoadError, match=said):
+            read_curve(path)
+    else:
+        assert len(read_curve(path).points_mm) == 3
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (
+            '{"frames": [{"points_mm": [["0", "0", "0"], ["0", "0", "5"]]}]}',
+            "frame 0 holds something else than numbers",
+        ),
+        ('{"frames": [{"points_mm": [[true, false, true], [false, false, false]]}]}', "something else than numbers"),
+        ('{"frames": [], "frames": [{"points_mm": [[0, 0, 0], [0, 0, 5]]}]}', "two values of the key 'frames'"),
+    ],
+)
+def test_a_truth_is_of_numbers_and_stands_once(tmp_path: Path, text: str, said: str) -> None:
+    path = tmp_path / "truth.json"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(LoadError, match=said):
+        read_truth(path, 1)
