@@ -60,13 +60,7 @@ def head_of(path: Path) -> Head | None:
     if not 1 <= count <= 7:
         raise unusable(path, f"dim[0] = {count}; allowed: 3, or 4 for a sequence")
     shape, items = axes_of(path, [int(n) for n in fields["dim"][1 : count + 1]])
-    kind = TYPES.get(int(fields["datatype"]))
-    if kind is None:
-        raise unusable(path, f"datatype {int(fields['datatype'])}; allowed: {sorted(TYPES)} (grey values); convert it")
-    bits = 8 * np.dtype(kind).itemsize
-    if int(fields["bitpix"]) not in (0, bits):
-        why = f"bitpix {int(fields['bitpix'])} and datatype {int(fields['datatype'])}, which has {bits}"
-        raise unusable(path, f"the header says {why}; allowed: the same; correct the header")
+    kind = _kind(path, fields)
     data = path_of_head if whole else other_half(path_of_head)
     begin = float(fields["vox_offset"])
     if not np.isfinite(begin) or begin != int(begin) or not (int(fields["size"]) + 4 if whole else 0) <= begin < 2**40:
@@ -78,14 +72,33 @@ def head_of(path: Path) -> Head | None:
         shift, begin = int(begin), 0.0
     else:
         shift = 0
-    slope, intercept = float(fields["slope"]), float(fields["intercept"])
-    used = (1.0, 0.0) if slope == 0.0 or np.isnan(slope) else (slope, intercept)  # 0 and NaN: stored as they are
-    if not np.all(np.isfinite(used)):
-        raise unusable(path, f"scl_slope {slope:g} and scl_inter {intercept:g}; allowed: finite; correct the header")
+    slope, intercept = _scale(path, fields)
     return Head(
-        path, shape, np.dtype(kind).newbyteorder(order), ((data, int(begin)),), spacing, origin, direction,
-        packing=packing, before=shift, items=items, slope=used[0], intercept=used[1], assumed=assumed,
+        path, shape, kind.newbyteorder(order), ((data, int(begin)),), spacing, origin, direction,
+        packing=packing, before=shift, items=items, slope=slope, intercept=intercept, assumed=assumed,
     )  # fmt: skip
+
+
+def _kind(path: Path, fields: Any) -> np.dtype[Any]:
+    """The type of the voxels; LoadError for one that is no grey value, or of another size than the header says."""
+    number, bits = int(fields["datatype"]), int(fields["bitpix"])
+    if number not in TYPES:
+        raise unusable(path, f"datatype {number}; allowed: {sorted(TYPES)} (grey values); convert it")
+    kind = np.dtype(TYPES[number])
+    if bits not in (0, 8 * kind.itemsize):
+        why = f"bitpix {bits} and datatype {number}, which has {8 * kind.itemsize}"
+        raise unusable(path, f"the header says {why}; allowed: the same; correct the header")
+    return kind
+
+
+def _scale(path: Path, fields: Any) -> tuple[float, float]:
+    """Slope and intercept of the grey values; 0 and NaN, as nibabel writes, say that they are stored as they are."""
+    slope, intercept = float(fields["slope"]), float(fields["intercept"])
+    if slope == 0.0 or np.isnan(slope):
+        return 1.0, 0.0
+    if not (np.isfinite(slope) and np.isfinite(intercept)):
+        raise unusable(path, f"scl_slope {slope:g} and scl_inter {intercept:g}; allowed: finite; correct the header")
+    return slope, intercept
 
 
 def _packing(path: Path) -> str:
