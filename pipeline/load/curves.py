@@ -141,9 +141,10 @@ def read_truth(path: Path, frame_count: int | None) -> list[Array]:
         curves = [np.array(frame["points_mm"]) for frame in found["frames"]]
     except (ValueError, KeyError, TypeError, IndexError):
         raise unusable(path, f"cannot be read as truth; expected {expected}") from None
-    texts = [n for n, curve in enumerate(curves) if curve.size and curve.dtype.kind not in "iuf"]
-    if texts:
-        raise unusable(path, f"frame {texts[0]} holds something else than numbers; expected {expected}")
+    for n, (curve, frame) in enumerate(zip(curves, found["frames"], strict=True)):
+        numbers = not curve.size or curve.dtype.kind in "iuf"
+        if not numbers or any(isinstance(v, bool) for point in frame["points_mm"] for v in point):
+            raise unusable(path, f"frame {n} holds something else than numbers; expected {expected}")
     curves = [curve.astype(np.float64) for curve in curves]
     frame_count = len(curves) if frame_count is None else frame_count
     if len(curves) != frame_count or any(c.ndim != 2 or c.shape[1] != 3 for c in curves):
