@@ -142,8 +142,8 @@ def read_truth(path: Path, frame_count: int | None) -> list[Array]:
     except (ValueError, KeyError, TypeError, IndexError):
         raise unusable(path, f"cannot be read as truth; expected {expected}") from None
     for n, (curve, frame) in enumerate(zip(curves, found["frames"], strict=True)):
-        numbers = not curve.size or curve.dtype.kind in "iuf"
-        if not numbers or any(isinstance(v, bool) for point in frame["points_mm"] for v in point):
+        flags = curve.ndim == 2 and any(isinstance(v, bool) for point in frame["points_mm"] for v in point)
+        if flags or (curve.size and curve.dtype.kind not in "iuf"):
             raise unusable(path, f"frame {n} holds something else than numbers; expected {expected}")
     curves = [curve.astype(np.float64) for curve in curves]
     frame_count = len(curves) if frame_count is None else frame_count

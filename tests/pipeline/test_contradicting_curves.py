@@ -136,6 +136,7 @@ def test_a_table_says_one_thing_in_plain_digits(tmp_path: Path, head: str, row: 
         ),
         ('{"frames": [{"points_mm": [[true, false, true], [false, false, false]]}]}', "something else than numbers"),
         ('{"frames": [{"points_mm": [[true, 0.5, 1], [0, 0, 5.5]]}]}', "something else than numbers"),
+        ('{"frames": [{"points_mm": [1, 2, 3]}]}', "expected 1 of shape"),
         ('{"frames": [], "frames": [{"points_mm": [[0, 0, 0], [0, 0, 5]]}]}', "two values of the key 'frames'"),
     ],
 )
