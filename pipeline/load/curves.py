@@ -43,13 +43,13 @@ def positions_of(path: Path, markup: dict[str, Any]) -> NDArray[np.float64]:
     if system not in SYSTEMS:
         raise refused(path, f"coordinateSystem {system!r}", "LPS or RAS", "save the curve again")
     factor = millimetres(path, str(markup.get("coordinateUnits", "mm")))
-    placed = [p for p in markup["controlPoints"] if isinstance(p, dict)]
-    unplaced = [n for n, p in enumerate(placed) if p.get("positionStatus", "defined") != "defined"]
+    with told(path):
+        each = [(p["position"], p.get("positionStatus", "defined")) for p in markup["controlPoints"]]
+        points = np.array([position for position, _ in each])
+    unplaced = [n for n, (_, status) in enumerate(each) if status != "defined"]
     if unplaced:
         got = f"{len(unplaced)} control points that are not placed, the first is {unplaced[0]}"
         raise refused(path, got, "defined positions", "place or delete them and save the curve again")
-    with told(path):
-        points = np.array([p["position"] for p in markup["controlPoints"]])
     if points.ndim != 2 or points.shape[1] != 3 or points.dtype.kind not in "iuf":
         raise refused(path, "control points that are not three numbers", "positions [x, y, z]", "save the curve again")
     return reachable(path, points * SYSTEMS[system] * factor)
