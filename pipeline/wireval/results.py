@@ -148,7 +148,7 @@ def read_run(out: Path, gates: Sequence[str] = ()) -> Results:
 
 
 def with_gates(found: Results, gates: Sequence[str]) -> Results:
-    """The results with a sentence for each ``fail_if`` that holds: of a score, of every simulator but the solver."""
+    """The results with a sentence for each ``fail_if`` that holds: of a score, of every simulator that is asked."""
     simulators = folders_in(found.out)
     asked = [gate(text, [*simulators]) for text in gates]
     judged = {
