@@ -109,7 +109,8 @@ def score(
     """Judge other simulators' wires; the results of the first one.
 
     curves : ``"mine=DIR"``, several of these, or ``{"mine": DIR, ...}``.     fail_if : as for ``run``; asked of every
-    simulator, or of the one that is named (``"mine:rms_mm>0.5"``), told in ``results.closed``.     more : options of ``wireval score``.
+    simulator, or of the one that is named (``"mine:rms_mm>0.5"``), told in ``results.closed``.     more : options of
+    ``wireval score``.
     Those of the others: ``read_results(out / "simulators" / NAME)``.
     """
     gates = [fail_if] if isinstance(fail_if, str) else list(fail_if)
