@@ -42,16 +42,27 @@ def _volumes(file: h5py.File, source: Source) -> list[h5py.Dataset]:
 def _require_volumes(group: h5py.Group, inside: list[Any], source: Source) -> None:
     """LoadError where a member that may be meant for a volume is none: those beside it would be taken for all frames.
 
-    Groups and datasets of one axis, as of depths, may stand beside volumes.
+    Numbers, datasets of one axis, as of depths, and groups of such may stand beside volumes.
     """
     for name, item in zip(sorted(group, key=natural_key), inside, strict=True):
-        if item is None:
-            what = "a link to nothing"
-        elif isinstance(item, h5py.Dataset) and item.ndim in (2, 4):
-            what = f"a dataset of the shape {item.shape}"
-        else:
-            continue
-        raise unusable(source, f"{group.name}/{name} is {what}; allowed: 3-D datasets, one a frame; remove or mend it")
+        what = _unlike_a_volume(item)
+        if what:
+            where = f"{group.name.rstrip('/')}/{name}"
+            raise unusable(source, f"{where} is {what}; allowed: 3-D datasets, one a frame; remove or mend it")
+
+
+def _unlike_a_volume(item: Any) -> str:
+    """What a member is that may be meant for a volume and is none; empty for a volume, and for what is no scan."""
+    if item is None:
+        return "a link to nothing"
+    if isinstance(item, h5py.Group):
+        deeper: list[str] = []
+        item.visititems(lambda name, one: deeper.append(name) if len(getattr(one, "shape", None) or ()) > 1 else None)
+        return f"a group, of {', '.join(deeper[:MOST_NAMES])}" if deeper else ""
+    if isinstance(item, h5py.Dataset) and item.shape is None:
+        return "an empty dataset"
+    plain = not isinstance(item, h5py.Dataset) or item.ndim in (0, 1, 3)
+    return "" if plain else f"a dataset of the shape {item.shape}"
 
 
 def _inside(group: h5py.Group, name: str, source: Source) -> Any:
@@ -120,11 +131,7 @@ def _header(source: Source, data: h5py.Dataset, config: LoadConfig) -> Header:
     volume_bytes, stored = a * b * c * data.dtype.itemsize, int(data.id.get_storage_size())
     total = int(np.prod([int(n) for n in data.shape], dtype=object)) * data.dtype.itemsize
     require_room(source, volume_bytes, 0, "", config.most_gib)
-    if stored == 0 or (data.chunks is None and stored < total):
-        raise unusable(source, f"{data.name}: {stored} of {total} bytes were ever written; write it again")
-    if data.chunks is not None and (there := data.id.get_num_chunks()) < (need := _chunks_of(data)):
-        # what was not written reads as zeros: a scan that ends in air
-        raise unusable(source, f"{data.name}: {there} of {need} chunks were ever written; write it again")
+    require_written(source, data)
     if data.chunks is not None:
         require_room(source, total, stored, "deflate", config.most_gib)
     defaults = {"origin_mm": "0, 0, 0", "direction": "along x, y, z"}
@@ -140,9 +147,21 @@ def _header(source: Source, data: h5py.Dataset, config: LoadConfig) -> Header:
     )
 
 
-def _chunks_of(data: h5py.Dataset) -> int:
-    """How many chunks a whole dataset has."""
-    return int(np.prod([-(-n // chunk) for n, chunk in zip(data.shape, data.chunks, strict=True)], dtype=object))
+def require_written(what: object, data: h5py.Dataset) -> None:
+    """LoadError where parts of a dataset were never written: they read as zeros, a scan that ends in air.
+
+    A label map's background may be left out like that on purpose, but looks no different from a map of which the last
+    part is missing: it has to be written, too.
+    """
+    again = "write it again, its background too (h5py: data[...] = data[...])"
+    if data.chunks is None:
+        need = int(np.prod(data.shape, dtype=object)) * data.dtype.itemsize
+        there, part = int(data.id.get_storage_size()), "bytes"
+    else:
+        need = int(np.prod([-(-n // chunk) for n, chunk in zip(data.shape, data.chunks, strict=True)], dtype=object))
+        there, part = int(data.id.get_num_chunks()), "chunks"
+    if there < need:
+        raise unusable(what, f"{data.name}: {there} of {need} {part} were ever written; {again}")
 
 
 def _numbers(source: Source, data: h5py.Dataset, name: str, default: NDArray[Any]) -> NDArray[np.float64]:

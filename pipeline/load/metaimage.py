@@ -36,7 +36,8 @@ def head_of(path: Path) -> Head:
     packing = "deflate" if _flag(path, tags, "CompressedData") else ""
     if not packing and not _flag(path, tags, "BinaryData", missing="True"):
         packing = "ascii"
-    swapped = any(_flag(path, tags, name) for name in ("BinaryDataByteOrderMSB", "ElementByteOrderMSB"))
+    order = _one_of(path, tags, ("BinaryDataByteOrderMSB", "ElementByteOrderMSB"))
+    swapped = _flag(path, tags, order)
     stored = np.dtype((">" if swapped else "<") + TYPES[kind])
     channels = int(numbers(path, tags, "ElementNumberOfChannels", 1, whole=True, missing="1")[0])
     files = _files(path, tags["ElementDataFile"], below, shape[2] * items)
@@ -46,12 +47,11 @@ def head_of(path: Path) -> Head:
         float(numbers(path, tags, f"ElementToIntensityFunction{name}", 1, missing=text)[0])
         for name, text in (("Slope", "1"), ("Offset", "0"))
     )
-    if packing == "deflate":
-        _require_packed(path, tags, parts)
+    said = int(numbers(path, tags, "CompressedDataSize", 1, whole=True, missing="0")[0])
     geometry, assumed = _geometry(path, tags, count)
     return Head(
-        path, shape, stored, parts, *geometry, packing=packing, items=items, channels=channels, slope=slope,
-        intercept=shift, assumed=assumed,
+        path, shape, stored, parts, *geometry, packing=packing, packed_bytes=said, items=items, channels=channels,
+        slope=slope, intercept=shift, assumed=assumed,
     )  # fmt: skip
 
 
@@ -66,7 +66,7 @@ def _tags(path: Path) -> tuple[dict[str, str], str, int]:
     tags: dict[str, str] = {}
     for line in _text(start[:end]).splitlines():
         name, _, value = (part.strip() for part in line.partition("="))
-        if tags.setdefault(name, value) != value:
+        if tags.setdefault(name, value) != value and name != "Comment":
             both = f"{name} = {tags[name][:40]} and {name} = {value[:40]}"
             raise unusable(path, f"the header says {both}; allowed: one of them; correct the header")
     return tags, _text(start[end:]), end
@@ -80,16 +80,14 @@ def _flag(path: Path, tags: dict[str, str], name: str, missing: str = "False") -
     return text[0] in "Tt1"
 
 
-def _require_packed(path: Path, tags: dict[str, str], parts: tuple[tuple[Path, int], ...]) -> None:
-    """LoadError where more packed data follow than the header says; 0 says nothing.
-
-    Fewer, of a file that was cut short, are found when it is read: that costs its frame, not the study.
-    """
-    said = int(numbers(path, tags, "CompressedDataSize", 1, whole=True, missing="0")[0])
-    there = sum(size_of(name) - begin for name, begin in parts)
-    if 0 < said < there:
-        why = f"CompressedDataSize = {said}, and {there} bytes follow to unpack; allowed: as many"
-        raise unusable(path, f"{why}; the header is not its own: write the file again")
+def _one_of(path: Path, tags: dict[str, str], names: tuple[str, ...]) -> str:
+    """The name by which a header gives what has several names, empty for none; LoadError where it gives two things."""
+    given = [name for name in names if name in tags]
+    for name in given[1:]:
+        if tags[name].split() != tags[given[0]].split():
+            both = " and ".join(f"{one} = {tags[one][:40]}" for one in (given[0], name))
+            raise unusable(path, f"the header says {both}; allowed: one of them; correct the header")
+    return given[0] if given else ""
 
 
 def _text(part: bytes) -> str:
@@ -132,8 +130,7 @@ def _geometry(path: Path, tags: dict[str, str], count: int) -> tuple[Placed, tup
     """Spacing, origin and direction, and what of it the header lacks."""
     factor = millimetres(path, tags.get("DistanceUnits", "mm"))
     given = next((name for name in ("ElementSpacing", "ElementSize") if name in tags), "")
-    place = next((name for name in PLACES if name in tags), "")
-    turn = next((name for name in TURNS if name in tags), "")
+    place, turn = _one_of(path, tags, PLACES), _one_of(path, tags, TURNS)
     lacks = [
         text
         for name, text in ((given, "spacing: 1 mm"), (place, "origin: 0, 0, 0 mm"), (turn, "direction: along x, y, z"))

@@ -89,6 +89,7 @@ def head_of(path: Path) -> Head:
     )  # fmt: skip
 
 
+ALIAS = {"datafile": "data file", "lineskip": "line skip", "byteskip": "byte skip"}
 DOMAINS = ("domain", "space", "time", "???", "none")
 
 
@@ -105,13 +106,11 @@ def _fields(path: Path) -> tuple[dict[str, str], int]:
     for line in text.splitlines()[1:]:
         name, colon, value = line.partition(":")
         if colon and not line.startswith("#"):
-            key = name if value.startswith("=") else name.strip().lower()
+            key = name if value.startswith("=") else ALIAS.get(name.strip().lower(), name.strip().lower())
             value = value.removeprefix("=").strip()
             if fields.setdefault(key, value) != value:
                 both = f"{key}: {fields[key][:40]} and {key}: {value[:40]}"
                 raise unusable(path, f"the header says {both}; allowed: one of them; correct the header")
-    alias = {"datafile": "data file", "lineskip": "line skip", "byteskip": "byte skip"}
-    fields = {alias.get(name, name): value for name, value in fields.items()}
     if fields.get("data file", "").upper().startswith("LIST"):
         fields["data file"] += "\n" + text.partition(fields["data file"])[2]
     return fields, end

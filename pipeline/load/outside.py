@@ -1,8 +1,9 @@
 """What headers of several formats have in common: numbers in text, units of length, names of other files."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +38,27 @@ def to_number(text: str) -> float:
     if not WRITTEN.fullmatch(text.strip()):
         raise ValueError(f"{text[:40]!r} is no number")
     return float(text)
+
+
+def to_numbers(words: Sequence[bytes]) -> NDArray[np.float64]:
+    """Numbers (n,) of a file's words, many at once; ValueError where ``to_number`` raises one."""
+    # numpy reads a word as Python does: of what that takes beyond numbers as written, all has one of these
+    if any(b"_" in word or not word.isascii() for word in words):
+        raise ValueError("something else than numbers")
+    return np.array(words, dtype=np.float64)
+
+
+EXACT = 2**53
+"""Whole numbers up to this one are read from text as they are."""
+
+
+def misfits(values: NDArray[np.float64], kind: np.dtype[Any]) -> tuple[NDArray[np.bool_], str]:
+    """Which of numbers (n,) that are written out a type cannot hold, and in words what it can."""
+    whole = kind.kind in "iu"
+    bounds = np.iinfo(kind) if whole else np.finfo(kind)
+    low, high = (max(bounds.min, -EXACT), min(bounds.max, EXACT)) if whole else (bounds.min, bounds.max)
+    bad = ~((values >= low) & (values <= high)) | (whole & (values != np.rint(values)))
+    return bad, f"{'whole ' * whole}numbers from {low} to {high}, as its type says"
 
 
 def to_whole(text: str) -> int:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from pipeline.load.geometry import Box, LoadError, unusable
 from pipeline.load.guard import require_room, size_of, skip, unpacked
+from pipeline.load.outside import misfits, to_numbers
 
 AXES, LONGEST_AXIS = (3, 4), 65535
 """Axes of a scan (the fourth counts volumes), and voxels along one at most."""
@@ -29,6 +30,7 @@ class Head:
 
     parts : the files that hold the voxels, in order and of equal share, each with the byte where its data begin.
     channels : values a voxel (fastest in memory).     items : volumes (slowest).     names : label values by name.
+    packed_bytes : that the header announces, 0 where it does not.
     before : bytes, once unpacked, before the first voxel.     slope, intercept : grey = slope * stored + intercept.
     """
 
@@ -40,6 +42,7 @@ class Head:
     origin_mm: NDArray[np.float64]
     direction: NDArray[np.float64]
     packing: str = ""
+    packed_bytes: int = 0
     before: int = 0
     items: int = 1
     channels: int = 1
@@ -89,6 +92,11 @@ def require_data(head: Head, most_gib: float, *, whole: bool = True) -> Head:
             kind = "is cut short" if there < need else "holds more than its header says"
             why = f"the file {kind}: {there} bytes of voxels, the header asks for {need}"
             raise unusable(path, f"{why} ({list(head.shape)} voxels of {head.kind}). Copy the file again.")
+    said, there = head.packed_bytes, sum(size_of(path) - offset for path, offset in head.parts)
+    if head.packing and said and (there > said or (whole and there < said)):
+        kind = "they end too early" if there < said else "the header is not its own"
+        why = f"CompressedDataSize = {said}, and {there} bytes follow to unpack: {kind}; allowed: as many"
+        raise unusable(head.path, f"{why}; write or copy the file again")
     return head
 
 
@@ -141,23 +149,25 @@ def _fill(file: IO[bytes], rows: NDArray[Any]) -> None:
 
 
 def _text(head: Head, item: int, box: Box) -> NDArray[Any]:
-    """A box of voxels that are written out as text; the whole file is read."""
+    """A box of voxels that are written out as text; the whole file is read. LoadError where one is not of its type."""
     count = int(np.prod(head.shape)) * head.items * head.channels
     with unpacked(head.parts[0][0], "", head.parts[0][1]) as file:
         words = file.read().split()
     if len(words) != count:
         raise unusable(head.path, f"{len(words)} numbers are written out, the header asks for {count}; copy it again")
-    values, kind = np.array(words, float), head.kind.newbyteorder("=")
-    bounds = np.iinfo(kind) if kind.kind in "iu" else np.finfo(kind)
-    bad = ~((values >= bounds.min) & (values <= bounds.max))
-    if kind.kind in "iu":
-        bad |= values != np.rint(values)
+    kind = head.kind.newbyteorder("=")
+    try:
+        values = to_numbers(words)
+    except ValueError:
+        raise unusable(
+            head.path, "voxels that are no numbers are written out; allowed: numbers; save it again"
+        ) from None
+    bad, allowed = misfits(values, kind)
     if bad.any():
-        allowed = f"{'whole ' * (kind.kind in 'iu')}numbers from {bounds.min} to {bounds.max}, as its type says"
         raise unusable(head.path, f"voxels of {values[bad][0]:g} are written out; allowed: {allowed}; save it again")
     values = values.astype(kind)
-    whole = values.reshape(head.items, *head.shape[::-1], head.channels)[item, ..., 0].T
-    return whole[tuple(slice(a, b) for a, b in zip(*box, strict=True))]
+    volume = values.reshape(head.items, *head.shape[::-1], head.channels)[item, ..., 0].T
+    return volume[tuple(slice(a, b) for a, b in zip(*box, strict=True))]
 
 
 def scaled(stored: NDArray[Any], slope: float, intercept: float) -> NDArray[Any]:

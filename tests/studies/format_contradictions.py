@@ -24,6 +24,16 @@ def contradictions() -> Iterator[formats.Variant]:
         yield Variant(f"nrrd, two of {old}", changed(nrrd, ("dimension", f"{new}\ndimension")), f"!{old}")
     packed = formats.by_itk("a.mha", compress=True)
     yield Variant("mha, packed to 5 bytes", changed(packed, ("CompressedDataSize =", "5")), "!CompressedDataSize = 5")
+    yield Variant(
+        "mha, packed to more", changed(packed, ("CompressedDataSize =", "99999")), "!CompressedDataSize = 99999"
+    )
+    yield Variant("mha, two comments", changed(mha, ("NDims", "Comment = a\nComment = b\nNDims")))
+    for old, new in (("Offset", "Position = 1 2 3"), ("TransformMatrix", "Rotation = 1 0 0 0 1 0 0 0 1")):
+        yield Variant(f"mha, {old} by two names", changed(mha, ("NDims", f"{new}\nNDims")), f"!{old}")
+    orders = changed(mha, ("NDims", "ElementByteOrderMSB = True\nNDims"))
+    yield Variant("mha, byte order by two names", orders, "!ElementByteOrderMSB = True")
+    skips = changed(nrrd, ("dimension", "byteskip: 3\nbyte skip: 0\ndimension"))
+    yield Variant("nrrd, byte skip by two names", skips, "!byte skip: 3 and byte skip: 0")
     for word in ("true", "T", "1"):
         swapped = changed(formats.big_endian, ("BinaryDataByteOrderMSB = True", f"BinaryDataByteOrderMSB = {word}"))
         yield Variant(f"mha, big-endian {word}", swapped)
@@ -34,12 +44,20 @@ def contradictions() -> Iterator[formats.Variant]:
     for slope, shift, want in ((np.inf, 0.0, "!scl_slope inf"), (2.0, np.nan, "!scl_inter nan"), (np.nan, 7.0, "")):
         named = f"nii, slope {slope:g} and intercept {shift:g}"
         yield Variant(named, nifti((formats.SLOPE, "ff", (slope, shift))), want or "right")
-    for text, said in (("65541", "65541"), ("3.5", "3.5"), ("1e300", "1e"), ("nan", "nan")):
+    for text, said in (
+        ("65541", "of 65541"),
+        ("3.5", "of 3.5"),
+        ("1e300", "of 1e"),
+        ("nan", "of nan"),
+        ("1_5", "that are no"),
+    ):
         for kind, plain in (("mha", formats.ascii_mha), ("nrrd", formats.ascii_nrrd)):
-            yield Variant(f"{kind}, written out with {text}", last_of(plain, text), f"!voxels of {said}")
+            yield Variant(f"{kind}, written out with {text}", last_of(plain, text), f"!voxels {said}")
     for name, written in (("slab", np.s_[:8]), ("first chunk", np.s_[:2, :2, :2])):
-        yield Variant(f"h5, {name} alone written", part_of_chunks(written), "!were ever written")
-    for what, word in (("link", "a link to nothing"), ("plane", "a dataset of the shape (7, 5)")):
+        yield Variant(f"h5, {name} alone written", part_of_chunks(written), "!its background too")
+    yield Variant("h5, sequence without its last volume", part_of_sequence, "!2 of 3 chunks were ever written")
+    said = {"plane": "a dataset of the shape (7, 5)", "group": "a group, of volume", "nothing": "an empty dataset"}
+    for what, word in {"link": "a link to nothing", **said}.items():
         yield Variant(f"h5, group with a {what}", group_with(what), f"!{word}")
     yield Variant("h5, group with depths", group_with("depths"), values=formats.numbered() + 2, item=2)
 
@@ -68,6 +86,15 @@ def part_of_chunks(written: object) -> Callable[[Path], Source]:
     return write
 
 
+def part_of_sequence(folder: Path) -> Source:
+    """A 4-D dataset whose writer ended before the last volume."""
+    with h5py.File(folder / "s.h5", "w") as file:
+        data = file.create_dataset("frames", (3, *formats.SHAPE[::-1]), "i2", chunks=(1, *formats.SHAPE[::-1]))
+        data[:2] = formats.numbered().T
+        data.attrs.update(spacing_mm=formats.SPACING, origin_mm=formats.ORIGIN, direction=formats.TURN)
+    return Source(folder / "s.h5", "/frames")
+
+
 def group_with(what: str) -> Callable[[Path], Source]:
     """Volumes, and something beside them."""
 
@@ -76,8 +103,11 @@ def group_with(what: str) -> Callable[[Path], Source]:
         with h5py.File(folder / "s.h5", "a") as file:
             if what == "link":
                 file["frames/3"] = h5py.SoftLink("/nowhere")
+            elif what == "nothing":
+                file["frames/3"] = h5py.Empty("i2")
             else:
-                file["frames/depths" if what == "depths" else "frames/3"] = np.zeros(4 if what == "depths" else (7, 5))
+                name, shape = {"depths": ("depths", 4), "plane": ("3", (7, 5)), "group": ("3/volume", (9, 7, 5))}[what]
+                file[f"frames/{name}"] = np.zeros(shape)
         return source
 
     return write
