@@ -37,6 +37,15 @@ SYSTEMS: dict[str, NDArray[np.float64]] = {
 }  # fmt: skip
 
 
+def of_json(found: list[Any]) -> NDArray[np.float64]:
+    """Numbers, or lists of them, as an array; ValueError for anything else: numpy takes "1" and true for numbers."""
+    values = np.array(found)
+    each = [value for row in found for value in (row if isinstance(row, list) else [row])]
+    if values.size and (values.dtype.kind not in "iuf" or any(isinstance(value, bool) for value in each)):
+        raise ValueError("something else than numbers")
+    return values.astype(np.float64)
+
+
 def positions_of(path: Path, markup: dict[str, Any]) -> NDArray[np.float64]:
     """Control points (n, 3) of a markup, LPS mm; a file that states no system is LPS, as in 3D Slicer, 0 is RAS."""
     system = str(markup.get("coordinateSystem", "LPS")).upper()
@@ -45,12 +54,15 @@ def positions_of(path: Path, markup: dict[str, Any]) -> NDArray[np.float64]:
     factor = millimetres(path, str(markup.get("coordinateUnits", "mm")))
     with told(path):
         each = [(p["position"], p.get("positionStatus", "defined")) for p in markup["controlPoints"]]
-        points = np.array([position for position, _ in each])
     unplaced = [n for n, (_, status) in enumerate(each) if status != "defined"]
     if unplaced:
         got = f"{len(unplaced)} control points that are not placed, the first is {unplaced[0]}"
         raise refused(path, got, "defined positions", "place or delete them and save the curve again")
-    if points.ndim != 2 or points.shape[1] != 3 or points.dtype.kind not in "iuf":
+    try:
+        points = of_json([position for position, _ in each])
+    except ValueError:
+        points = np.zeros(0)
+    if points.ndim != 2 or points.shape[1] != 3:
         raise refused(path, "control points that are not three numbers", "positions [x, y, z]", "save the curve again")
     return reachable(path, points * SYSTEMS[system] * factor)
 
@@ -138,14 +150,15 @@ def read_truth(path: Path, frame_count: int | None) -> list[Array]:
     expected = '{"frames": [{"points_mm": [[x, y, z], ...]}]}'
     found = read_json(path, expected)
     try:
-        curves = [np.array(frame["points_mm"]) for frame in found["frames"]]
-    except (ValueError, KeyError, TypeError, IndexError):
+        listed = [frame["points_mm"] for frame in found["frames"]]
+    except (KeyError, TypeError, IndexError):
         raise unusable(path, f"cannot be read as truth; expected {expected}") from None
-    for n, (curve, frame) in enumerate(zip(curves, found["frames"], strict=True)):
-        flags = curve.ndim == 2 and any(isinstance(v, bool) for point in frame["points_mm"] for v in point)
-        if flags or (curve.size and curve.dtype.kind not in "iuf"):
-            raise unusable(path, f"frame {n} holds something else than numbers; expected {expected}")
-    curves = [curve.astype(np.float64) for curve in curves]
+    curves = []
+    for number, points in enumerate(listed):
+        try:
+            curves.append(of_json(points))
+        except (ValueError, TypeError):
+            raise unusable(path, f"frame {number} holds something else than numbers; expected {expected}") from None
     frame_count = len(curves) if frame_count is None else frame_count
     if len(curves) != frame_count or any(c.ndim != 2 or c.shape[1] != 3 for c in curves):
         raise unusable(path, f"holds {len(curves)} curves, expected {frame_count} of shape (n, 3), one per frame")

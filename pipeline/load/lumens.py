@@ -4,10 +4,11 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.load.curves import markups_in, positions_of
+from pipeline.load.curves import markups_in, of_json, positions_of
 from pipeline.load.geometry import Mask, Source, refused
 from pipeline.load.guard import reachable, read_text, told
 from pipeline.load.masks import read_mask
+from pipeline.load.outside import to_numbers
 from pipeline.load.surfaces import read_stl, read_vtp
 from pipeline.model import Branches, Shapes, Volume
 
@@ -16,7 +17,8 @@ def read_swc(path: Path) -> Branches:
     """A .swc tree: number, type, x, y, z, radius, parent (-1 = root), lengths in mm."""
     try:
         lines = read_text(path).splitlines()
-        table = np.array([r.split() for r in lines if r.strip() and not r.lstrip().startswith("#")], float)
+        rows = [r.encode().split() for r in lines if r.strip() and not r.lstrip().startswith("#")]
+        table = np.array([to_numbers(row) for row in rows])
     except ValueError:
         got = "a line that is not seven numbers"
         raise refused(path, got, "seven numbers a line", "export it again as .swc") from None
@@ -44,7 +46,8 @@ def read_markups_branches(path: Path) -> Branches:
         if values is None or len(values) != len(points):
             allowed = "a measurement named Radius with one of controlPointValues for every point"
             raise refused(path, f"curve {markup.get('name', '?')!r} without radii", allowed, "or give an .swc")
-        radius = np.array(values, dtype=float)
+        with told(path):
+            radius = of_json(values)
         if len(points) < 2 or not np.all(np.isfinite(points)) or not np.all((radius > 0) & np.isfinite(radius)):
             got = f"curve {markup.get('name', '?')!r} of {len(points)} points, radii {radius.tolist()[:4]}"
             raise refused(path, got, "two finite points or more, radii above 0", "correct the curve")

@@ -4,10 +4,12 @@ import re
 from pathlib import Path
 
 from pipeline.load.geometry import refused
+from pipeline.load.outside import UNITS_MM
 from pipeline.load.surfaces import space_of
 
 HEAD = 4096  # bytes of a file in which it says what it is
 _SPACE = re.compile(r"(?:SPACE|coordinateSystem)\"?\s*[:=]\s*\"?(LPS|RAS|[01]\b)", re.IGNORECASE)
+_SPACES = {"1": "LPS", "0": "RAS"}  # as 3D Slicer numbers them
 _UNIT = re.compile(r"(?:units?|coordinateUnits)\"?\s*[:=]\s*\"?([A-Za-z]+)|lengths in (\w+)", re.IGNORECASE)
 
 
@@ -28,16 +30,19 @@ def stated_in(path: Path, kind: str) -> tuple[str, str]:
     space, unit = _SPACE.search(head), _UNIT.search(head)
     if kind == ".csv":
         _require_one(path, head, default)
-    said = {"1": "LPS", "0": "RAS"}.get(space[1], space[1].upper()) if space else default[0]
+    said = _SPACES.get(space[1], space[1].upper()) if space else default[0]
     return said, (unit[1] or unit[2]).lower() if unit else default[1]
 
 
 def _require_one(path: Path, head: str, default: tuple[str, str]) -> None:
     """LoadError where the lines above a table contradict each other, or the names of its columns."""
-    spaces = {match[1].upper() for match in _SPACE.finditer(head)}
-    units = {(match[1] or match[2]).lower() for match in _UNIT.finditer(head)}
-    for said in (spaces, units | {default[1]} if units and default[1] else units):
-        if len(said) > 1:
+    spaces = {match[1].upper(): _SPACES.get(match[1], match[1].upper()) for match in _SPACE.finditer(head)}
+    named = [(match[1] or match[2]).lower() for match in _UNIT.finditer(head)]
+    units = {unit: UNITS_MM.get(unit, unit) for unit in named}
+    if units and default[1]:
+        units[default[1]] = UNITS_MM[default[1]]
+    for said in (spaces, units):
+        if len(set(said.values())) > 1:
             got = " and ".join(sorted(said))
             where = "in the lines above its table" + ", or its columns (x_mm)" * (said is not spaces)
             raise refused(path, f"{got} {where}", "one of them", "correct the file")

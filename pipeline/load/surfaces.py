@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from pipeline.load.geometry import refused
 from pipeline.load.guard import reachable, read_bytes, told
-from pipeline.load.outside import to_number
+from pipeline.load.outside import misfits, to_numbers
 from pipeline.model import Shapes
 from reports.texts import TEXT_BYTES
 
@@ -82,10 +82,20 @@ class _Vtp:
         kind = np.dtype(self.header[0] + _TYPES[str(node.get("type"))])
         form = node.get("format")
         if form == "ascii":
-            return np.array([to_number(word) for word in (node.text or "").split()], dtype=float).astype(kind)
+            return self._written(node, kind)
         tail = (node.text or "").encode() if form == "binary" else self.tail[int(node.get("offset", "0")) :]
         raw = form != "binary" and self.encoding == "raw"
         return np.frombuffer(self._payload(tail if raw else self._decoded(tail)), kind)
+
+    def _written(self, node: ET.Element, kind: np.dtype[Any]) -> NDArray[Any]:
+        """An array that is written out as text; LoadError where a number is none of its type."""
+        values = to_numbers((node.text or "").encode().split())
+        bad, allowed = misfits(values, kind)
+        bad &= np.isfinite(values)
+        if bad.any():
+            got = f"{values[bad][0]:g} in an array of {node.get('type')}"
+            raise refused(self.path, got, allowed, "write it again")
+        return values.astype(kind)
 
     def _decoded(self, text: bytes) -> bytes:
         """Decode base64 in which VTK codes the header apart from the data when it compresses."""
@@ -123,6 +133,7 @@ class _Vtp:
 def _cells(file: _Vtp, piece: ET.Element, kind: str, count: int) -> list[NDArray[np.int64]]:
     node = piece.find(kind)
     if node is None:
+        _require_count(file.path, piece, kind, 0)
         return []
     arrays = {str(a.get("Name")): file.array(a).astype(np.int64) for a in node.findall("DataArray")}
     corners, ends = (arrays.get(name, np.zeros(0, np.int64)) for name in ("connectivity", "offsets"))
@@ -167,6 +178,9 @@ def read_vtp(path: Path) -> Shapes:
     with told(path):
         file = _Vtp(path)
         piece, node = _piece(path, file)
+        if node.get("NumberOfComponents", "3") != "3":
+            got = f"Points of {node.get('NumberOfComponents')} numbers each"
+            raise refused(path, got, 'NumberOfComponents="3"', "write it again")
         points = reachable(path, to_lps(file.head, file.array(node).astype(np.float64).reshape(-1, 3)))
         _require_count(path, piece, "Points", len(points))
         fans = [
@@ -193,7 +207,7 @@ def read_stl(path: Path) -> Shapes:
     else:
         found = re.findall(rb"vertex\s+(\S+)\s+(\S+)\s+(\S+)", raw)
         try:
-            corners = np.array(found, dtype=float).reshape(-1, 3)
+            corners = to_numbers([word for corner in found for word in corner]).reshape(-1, 3)
         except ValueError:
             got = "a vertex that is not three numbers"
             raise refused(path, got, "three numbers after each vertex", "export it again as .stl") from None

@@ -15,6 +15,8 @@ import numpy as np
 from pipeline.load.curves import READERS, read_csv_points
 from pipeline.load.geometry import LoadError, Source, refused, unusable
 from pipeline.load.guard import size_of
+from pipeline.load.hdf5 import require_written
+from pipeline.load.outside import to_whole
 from pipeline.load.stated import stated_in
 from pipeline.load.surfaces import RAS_TO_LPS
 from pipeline.load.vtk import read_vtk_points
@@ -93,8 +95,8 @@ def _in_hdf5(path: Path, count: int, space: str, unit: str) -> list[OtherFile]:
     size_of(path)
     try:
         with h5py.File(path, "r") as file:
-            groups = {int(name): group for name, group in file["frames"].items()}
-            points = {n: np.array(g["simulated_mm"], float) for n, g in groups.items() if "simulated_mm" in g}
+            groups = _by_number(path, file["frames"])
+            points = {n: _written(path, g["simulated_mm"]) for n, g in groups.items() if "simulated_mm" in g}
     except (OSError, KeyError, ValueError, AttributeError, TypeError, RuntimeError) as error:
         what, allowed = "no HDF5 file, or one of another layout", "/frames/NNN/simulated_mm (n, 3), NNN from 0"
         raise refused(path, what, allowed, "write it so") from error
@@ -104,6 +106,24 @@ def _in_hdf5(path: Path, count: int, space: str, unit: str) -> list[OtherFile]:
     missing = OtherFile(path.name, problem="it has no simulated_mm for this frame", missing=True)
     found = {n: replace(_checked(f"{path.name}#{n}", wire), where=f"{path}#{n}") for n, wire in points.items()}
     return [found.get(n, missing) for n in range(count)]
+
+
+def _by_number(path: Path, frames: h5py.Group) -> dict[int, h5py.Group]:
+    """The groups of frames by their numbers; LoadError where two have one number, as 1 and 001."""
+    groups = {to_whole(name): group for name, group in frames.items()}
+    if len(groups) < len(frames):
+        got = f"{len(frames)} groups of {len(groups)} numbers"
+        raise unusable(path, f"got {got} below /frames; allowed: one of each number; remove the others")
+    return groups
+
+
+def _written(path: Path, data: h5py.Dataset) -> Array:
+    """The points of a dataset; TypeError where they are no numbers, LoadError where some were never written."""
+    if data.dtype.kind not in "iuf":
+        raise TypeError(f"{data.name} holds {data.dtype}")
+    if data.size:
+        require_written(path, data)
+    return np.array(data, float)
 
 
 def _read(path: Path, space: str, unit: str) -> OtherFile:
