@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.load.geometry import refused
+from pipeline.load.geometry import LoadError, refused
 from pipeline.load.guard import reachable, read_bytes, told
 from pipeline.load.outside import misfits, to_numbers
 from pipeline.model import Shapes
@@ -113,7 +113,7 @@ class _Vtp:
         first = struct.unpack(self.header, data[:size])[0]
         if not self.compressed:
             if len(data) < size + first:
-                raise ValueError("cut short")
+                raise _cut_short(self.path, len(data) - size, first)
             return data[size : size + first]
         sizes = struct.unpack_from(f"{self.header[0]}{first}{self.header[1]}", data, 3 * size)
         ends = (3 + first) * size + np.cumsum([0, *sizes])
@@ -126,8 +126,14 @@ class _Vtp:
                 got = f"arrays that unpack to more than {MOST_UNPACKED / 2**20:.0f} MiB"
                 raise refused(self.path, got, "less", "make the surface coarser, or save it uncompressed")
             if not unpack.eof:
-                raise ValueError("cut short")
+                raise _cut_short(self.path, len(data[a:b]), b - a if len(data) < b else None)
         return b"".join(blocks)
+
+
+def _cut_short(path: Path, there: int, said: int | None) -> LoadError:
+    """An array that ends too early. there, said : bytes of it, the latter None where a packed block has no end."""
+    got = f"{there} bytes of an array" + (f" that says {said}" if said is not None else ", packed, without their end")
+    return refused(path, got, "all of it", "copy the file again")
 
 
 def _cells(file: _Vtp, piece: ET.Element, kind: str, count: int) -> list[NDArray[np.int64]]:
