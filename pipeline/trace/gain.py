@@ -1,4 +1,5 @@
-"""A frame's contrast over its reference's, and its correction: contrast medium is never twice the same.
+"""A frame's contrast over its reference's, how far its grey lies off, and the correction of both: contrast medium is
+never twice the same, and grey is counted from elsewhere where a scanner is not calibrated.
 
 A wire, blurred, reaches every voxel of a narrow vessel and makes it brighter, never darker: the medium is read off the
 darkest tenth of the lumen.
@@ -22,6 +23,9 @@ DARKEST = 0.1
 quantile by a third of the noise of a voxel, and a median by any amount."""
 SAME_GAIN = 0.02
 """Difference of two scans' contrast, as a share of it, that is left alone."""
+SAME_OFFSET = 0.1
+"""Difference of two scans' grey outside the lumen, in noises of a voxel, that is left alone: half of a noise (a lost
+intercept, a scanner that is not calibrated) cost every second wire, a quarter of one none."""
 SAME_NOISE = 0.5
 """The same in noises of a voxel, as an estimate from the darkest tenth may be off by that."""
 
@@ -45,7 +49,8 @@ def _difference(rest: Array, full: Array, deep: NDArray[np.bool_], out: NDArray[
 def matched(
     grey: NDArray[np.float32], background: NDArray[Any], region: SearchRegion, frame: Grid, still: NDArray[Any]
 ) -> float:
-    """The frame's contrast over the reference's; ``grey``, frame minus background, is corrected where that is not 1.
+    """The frame's contrast over the reference's; ``grey``, frame minus background, is corrected where that is not 1, or
+    where the frame's grey lies off.
 
     still : the reference's own grey at ``region.sample``.
     """
@@ -57,7 +62,8 @@ def matched(
     low, offset = float(np.median(background[at][out])), float(np.median(grey[at][out]))
     seen = frame.values[tuple((region.sample + region.corner).T)].astype(float)
     more = _difference(seen - still, background[at] - low, deep, out)
-    if more != 0.0:
+    apart = abs(offset) > SAME_OFFSET * spread((seen - still)[out])
+    if more != 0.0 or apart:
         everywhere = tuple(voxels_of(region.runs).T)
         medium = np.float32(more) * (background[everywhere] - np.float32(low))
         grey[everywhere] -= np.float32(offset) + medium.astype(np.float32)

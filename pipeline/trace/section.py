@@ -28,6 +28,9 @@ MEDIAN = 1.18
 """Median of a complex number's size over the standard deviation of its parts."""
 SURE = 2.0
 """Three standard deviations of the median of n independent ones, over that median, times the square root of n."""
+TWISTS, SURE_TWISTED = (-0.2, -0.15, -0.1, -0.05, 0.05, 0.1, 0.15, 0.2), 2.7
+"""Turns per mm of two wires about each other that are looked for, so near each other that what is averaged over OVER_MM
+stays in phase: pitches from 4.5 mm up. Four standard deviations, as the largest of several is taken."""
 
 
 def carried(tangents: Array) -> tuple[Array, Array]:
@@ -69,29 +72,50 @@ def out_of_round(image: Subtraction, points: Array, read: tuple[Array, Array]) -
 
     read : of ``read_around``.
     """
+    step = _step(points)
+    width = _width(points, step)
+    independent = max(1.0, min(OVER_MM, width * step) / (INDEPENDENT_VOXELS * image.voxel))
+    usual = float(np.median(np.convolve(read[1], np.ones(width) / width, "same")))
+    noise = image.noise_in(CREST_VOXELS) * np.sqrt(4.0 / ANGLES / independent) / max(usual, 1e-9)
+    return _oblong(points, read, 0.0), float(noise)
+
+
+def _step(points: Array) -> float:
+    return float(np.mean(np.linalg.norm(np.diff(points, axis=0), axis=1)))
+
+
+def _width(points: Array, step: float) -> int:
+    """Points that are averaged over."""
+    return min(len(points), max(1, round(OVER_MM / step)))
+
+
+def _oblong(points: Array, read: tuple[Array, Array], twist: float) -> Array:
+    """The size (n,) of the harmonic's mean over the grey's, for a section that turns by so many turns per mm."""
     ring, grey = read
-    step = float(np.mean(np.linalg.norm(np.diff(points, axis=0), axis=1)))
-    harmonic = second_harmonic(ring)
-    width = min(len(points), max(1, round(OVER_MM / step)))
+    step = _step(points)
+    width = _width(points, step)
     window = np.ones(width) / width
     axis = np.convolve(grey, window, "same")
-    usual = float(np.median(axis))
-    smooth = np.abs(np.convolve(harmonic, window, "same")) / np.maximum(axis, max(0.3 * usual, 1e-9))
-    independent = max(1.0, min(OVER_MM, width * step) / (INDEPENDENT_VOXELS * image.voxel))
-    noise = image.noise_in(CREST_VOXELS) * np.sqrt(4.0 / ANGLES / independent) / max(usual, 1e-9)
-    return np.asarray(smooth, float), float(noise)
+    turned = second_harmonic(ring) * np.exp(-4j * np.pi * twist * step * np.arange(len(grey)))
+    least = max(0.3 * float(np.median(axis)), 1e-9)
+    return np.asarray(np.abs(np.convolve(turned, window, "same")) / np.maximum(axis, least), float)
 
 
-def paired(image: Subtraction, oblong: Array, noise: float, length_mm: float) -> float:
-    """How far out of round the whole line is, over what one wire's may be: above 1 it is two in contact all along.
+def paired(image: Subtraction, points: Array, read: tuple[Array, Array], noise: float, length_mm: float) -> float:
+    """How far out of round the whole line (n, 3) is, over what one wire's may be: above 1 it is two in contact all
+    along, side by side or turned about each other.
 
-    oblong (n,), noise : of ``out_of_round``, whose median over the line is that of noise alone where the wire is round.
+    read : of ``read_around``.     noise : of ``out_of_round``, whose median over the line is that of noise alone where
+    the wire is round.
     """
     independent = max(1.0, length_mm / OVER_MM)
-    of_noise = MEDIAN * noise * (1.0 + SURE / np.sqrt(independent))
-    left = float(np.median(oblong)) ** 2 - of_noise**2
     uneven = float(np.max(image.spacing) / np.min(image.spacing)) - 1.0
-    return float(np.sqrt(max(0.0, left))) / (PAIRED * (1.0 + uneven))
+    left = []
+    for twist in (0.0, *TWISTS):
+        sure = SURE_TWISTED if twist else SURE
+        of_noise = MEDIAN * noise * (1.0 + sure / np.sqrt(independent))
+        left.append(float(np.median(_oblong(points, read, twist))) ** 2 - of_noise**2)
+    return float(np.sqrt(max(0.0, *left))) / (PAIRED * (1.0 + uneven))
 
 
 def fills_vessel(image: Subtraction, points: Array, sigma: float) -> bool:

@@ -162,7 +162,7 @@ def judge(image: Subtraction, attempt: Attempt, points: Array, bridged: NDArray[
     faint_mm, double_mm = (float(np.count_nonzero(m)) * step for m in (faint & ~bridged, double))
     objections = of_the_way(attempt, length_mm)
     objections += _of_the_line(image, attempt, points, (share, noise, outside), (faint_mm, double_mm, length_mm))
-    pair = 0.0 if image.thick_slices else paired(image, oblong, doubtful, length_mm)
+    pair = 0.0 if image.thick_slices else paired(image, points, read, doubtful, length_mm)
     objections += of_a_pair(pair, attempt)
     folded = bool(beside_itself(points, step, TIP_BESIDE * image.voxel)[-1])
     objections += of_the_ends(image, attempt, points, length_mm, folded=folded)

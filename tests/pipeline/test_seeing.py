@@ -21,6 +21,7 @@ from pipeline.trace.ends import sharpest_turn_deg
 from pipeline.trace.onward import seen_outside
 from pipeline.trace.profile import Steps
 from pipeline.trace.reach import end_range
+from pipeline.trace.section import carried
 from pipeline.trace.subtraction import CREST_VOXELS, subtracted
 from pipeline.trace.tube import Tube, spline_through, tint_nodes
 from pipeline.trace.verdict import judge
@@ -224,6 +225,40 @@ def test_without_its_reference_a_frame_is_not_believed_alone():
 def test_the_wall_lies_half_way_to_the_local_level(case):
     row = look(case, 0)
     assert row.wall < 0.2, "voxel; 0.9 to 1.9 with one level for the whole vessel"
+
+
+@pytest.mark.parametrize(("voxels", "pitch_mm"), [(1.25, 8.0), (1.5, 6.0), (2.0, 12.0)])
+def test_two_wires_turned_about_each_other_are_not_one(voxels, pitch_mm):
+    """Traced midway, ok, 0.6 to 1.1 voxel off at a claimed 0.06 to 0.2: which way they lie apart was averaged away."""
+    draft = Draft(np.random.default_rng(3), radius=2.2, wire_radius=0.18, room=0.9)
+    tangents = np.gradient(draft.path, axis=0)
+    tangents /= np.linalg.norm(tangents, axis=1)[:, None]
+    one, two = carried(tangents)
+    phase = 2.0 * np.pi * arc_of(draft.path)[:, None] / pitch_mm
+    other = draft.path + 0.3 * voxels * (np.cos(phase) * one + np.sin(phase) * two)
+    draft.others = [(other, 0.18, 1.0)]
+    scene = draft.scan(10)
+    curve = trace(
+        scene.frame, segment(scene.reference, scene.entry[None]), scene.entry, scene.direction,
+        reference=scene.reference,
+    )  # fmt: skip
+    assert curve.status is FrameStatus.TRACE_AMBIGUOUS
+    assert "out of round all along" in curve.note or "one strand" in curve.note
+
+
+@pytest.mark.parametrize("noises", [-10.0, -0.5, 0.5])
+def test_grey_that_is_counted_from_elsewhere_costs_no_wire(noises):
+    """A reference without its intercept, or of a scanner that is not calibrated: half a noise lost every second."""
+    scene = Draft(np.random.default_rng(1)).scan(8)
+    lumen = segment(scene.reference, scene.entry[None])
+    noise = float(np.std(scene.reference.values[:20, :20, :20]))
+    moved = replace(scene.reference, values=scene.reference.values + np.float32(noises * noise))
+    plain, other = (
+        trace(scene.frame, lumen, scene.entry, scene.direction, reference=still) for still in (scene.reference, moved)
+    )
+    assert plain.status is other.status is FrameStatus.OK, other.note
+    assert np.linalg.norm(plain.points_mm[-1] - other.points_mm[-1]) < 0.1 * scene.voxel
+    assert other.levels["gain"] == pytest.approx(plain.levels["gain"], abs=0.02)
 
 
 def narrow(seed, gain):
