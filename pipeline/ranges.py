@@ -86,3 +86,14 @@ Direction = Annotated[Vector, AfterValidator(_unit)]
 PositiveProfile = Annotated[Profile, AfterValidator(partial(_checked, lowest=1e-12, highest=1e9)), _PROFILE]
 OpacityProfile = Annotated[Profile, AfterValidator(partial(_checked, lowest=1e-3, highest=1e6)), _PROFILE]
 FiniteProfile = Annotated[Profile, AfterValidator(partial(_checked, lowest=-100.0, highest=100.0)), _PROFILE]
+
+
+def _visible(value: Any) -> Any:
+    """A name without blanks around it; ValueError for one with characters that nobody sees, as two would differ by."""
+    if isinstance(value, str) and not value.strip().isprintable():
+        raise ValueError(f"{value!r} has characters that are not seen; write it in letters, digits and blanks")
+    return value.strip() if isinstance(value, str) else value
+
+
+Name = Annotated[str, BeforeValidator(_visible)]
+"""What people call a group, or a phantom."""

@@ -230,7 +230,8 @@ def _case_rows(before: pd.DataFrame, after: pd.DataFrame, tolerance: Mapping[str
                     continue
                 pair = (old[frame][name], new[frame][name])
                 a, b = (math.nan if pd.isna(value) else float(value) for value in pair)
-                if verdict in ("same", "better") or not math.isnan(b):  # a frame that fails now counts once
+                # a frame that fails now counts once, though it may have errors
+                if verdict in ("same", "better") or (verdict == "moved" and not math.isnan(b)):
                     yield frame, name, a, b, b - a, allowed, _verdict(name, a, b, allowed)
         elif frame in old:
             yield frame, "frame", "present", "missing", math.nan, math.nan, "regression"

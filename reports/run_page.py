@@ -33,7 +33,7 @@ from reports.records import read_json
 from reports.schema import FAILURES, OVERALL_FILE, SIMULATORS, SUMMARY, SWEEP
 from reports.sweep import silent_points
 from reports.tables import read_if_there
-from reports.verdict import Doubt, badge, unscored, verdict
+from reports.verdict import Doubt, badge, of_these_alone, unscored, verdict
 from reports.what_next import next_command, typed, worst_frames
 from reports.worse import worse_cases, worse_sentence
 
@@ -160,10 +160,8 @@ def _judged(
     """Badge and verdict over all cases. row : of overall.csv.     why_none : why there may be no verdict."""
     copied = copied_from_traces({case.name: case.result.get("warnings", ()) for case in cases})
     doubt = Doubt(copied, twins(doubted(out_dir)))
-    return {
-        "badge": badge(status, status == "ok", row, doubt),
-        "verdict": verdict(row, _simulator(cases), doubt) or why_none,
-    }
+    said = " ".join(filter(None, (verdict(row, _simulator(cases), doubt), of_these_alone(row))))
+    return {"badge": badge(status, status == "ok", row, doubt), "verdict": said or why_none}
 
 
 def _headline(cases: list[CaseFiles], missing: Sequence[str], damaged: Container[str]) -> dict[str, str]:

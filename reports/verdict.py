@@ -218,6 +218,12 @@ def _few_insertions(statistics: Mapping[str, Any]) -> str:
     return f"Intervals over {told.removeprefix(_WIDE)} are wide: a perfect wire may have such a one; scan more."
 
 
+def of_these_alone(statistics: Mapping[str, Any]) -> str:
+    """That a skill without an interval speaks of the insertions that there are: with three it may not be shown."""
+    withheld = "withheld" in str(statistics.get("interval")) and _skill(statistics)[1] > 0.0
+    return "It is of these insertions alone: what others would give takes three at least." * withheld
+
+
 def _of_frames(statistics: Mapping[str, Any]) -> str:
     """Over how many of the planned frames the verdict speaks, where it is not all of them."""
     good, planned = (_number(statistics.get(key)) for key in ("frames_ok", "frames"))

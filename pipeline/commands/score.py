@@ -73,27 +73,30 @@ def main(args: argparse.Namespace) -> int:
     sys.stderr.writelines(f"{line}\n" for line in warnings if args.quiet)
     for line in side_by_side(args.out, {name: plan.out for name, plan in plans.items()}, args.embed):
         say(line)
-    closed = _closed(gates, plans, totals, args.junit)
+    closed, opened = _asked(gates, plans, totals, args.junit)
+    for line in () if args.quiet else opened:
+        say(line)
     sys.stderr.writelines(f"{line}\n" for line in closed)
     return 0 if all(one.all_ok for one in totals.values()) and not closed else 1
 
 
-def _closed(
+def _asked(
     gates: "Sequence[Gate]", plans: "Mapping[str, Plan]", totals: "Mapping[str, Totals]", junit: Path | None
-) -> list[str]:
-    """Why simulators must not pass, told in the JUnit summary, too, where one is asked for."""
+) -> tuple[list[str], list[str]]:
+    """Why simulators must not pass, and which gates are open; told in the JUnit summary, too, where one is asked."""
     from pipeline.run.aggregate import write_tests
-    from pipeline.run.gate import held
+    from pipeline.run.gate import held, open_lines
     from pipeline.run.results import found_results
 
-    judged = {
-        f"{name}: {asked}": f"{name}: {why}" * bool(why)
-        for name, plan in plans.items()
-        for asked, why in held(gates, plan.out, totals[name].pooled, name).items()
-    }
+    judged: dict[str, str] = {}
+    opened: list[str] = []
+    for name, plan in plans.items():
+        own = held(gates, plan.out, totals[name].pooled, name)
+        opened += [f"{name}: {line}" for line in open_lines(gates, own, totals[name].pooled)]
+        judged |= {f"{name}: {asked}": f"{name}: {why}" * bool(why) for asked, why in own.items()}
     if junit:
         write_tests(junit, {f"{name}/": found_results(plan.out) for name, plan in plans.items()}, judged)
-    return [why for why in judged.values() if why]
+    return [why for why in judged.values() if why], opened
 
 
 def _judged(plans: "Mapping[str, Plan]", quiet: bool) -> "dict[str, Totals]":

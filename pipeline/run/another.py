@@ -17,14 +17,11 @@ from pipeline.compare.nulls import ANOTHER
 from pipeline.model import Array
 from pipeline.run.kin import SAME_ENTRY_MM, with_kin
 from pipeline.run.overall import Found, phantoms_of
-from pipeline.run.stages.repeated import ALIKE
+from pipeline.run.stages.repeated import ALIKE, ONE_WIRE
 from pipeline.run.traced import Traces, skip_mm_of, traces_of
 from reports.case_files import listed
 from reports.doubts import COUNT_AS
 
-ONE_WIRE = 3.0
-"""Distance between two insertions' traces over their standard deviation, below which their wires lie alike: two scans
-of one wire are traced twice their standard deviation apart (1.4 times along each of two axes)."""
 WRITTEN = "are one scan, written again"
 OR_ELSE = ", or each a group of its own name where the wire was drawn out and pushed in again between the scans"
 RESCANNED = "tell no more than one insertion that was scanned again"

@@ -26,7 +26,7 @@ from pydantic.config import JsonDict
 from pipeline.load.geometry import LoadError
 from pipeline.load.guard import read_toml, status_of
 from pipeline.model import OverWire, Uncertainty, Wall, Wire
-from pipeline.ranges import Axis, Depth, Direction, Finite, NonNegative, Number, Point, Positive
+from pipeline.ranges import Axis, Depth, Direction, Finite, Name, NonNegative, Number, Point, Positive
 from pipeline.status import InputError, did_you_mean
 from pipeline.study.borrowed import borrowing_problems
 from pipeline.study.catheter import catheter_problems
@@ -69,8 +69,8 @@ class Case(Strict):
     id: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$", max_length=LONGEST_NAME, json_schema_extra=IDS)]
     role: Literal["validation", "calibration"] = "validation"
     assumed: tuple[Annotated[str, Field(min_length=1, max_length=1000)], ...] = ()
-    group: str = Field(default_factory=lambda data: data.get("id", ""), min_length=1, max_length=200)
-    phantom: str = Field("", max_length=200)
+    group: Name = Field(default_factory=lambda data: data.get("id", ""), min_length=1, max_length=200)
+    phantom: Name = Field("", max_length=200)
     reference: SourceText | None = None
     frames: Sources = ()
     entry_mm: Point

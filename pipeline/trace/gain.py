@@ -23,9 +23,9 @@ DARKEST = 0.1
 quantile by a third of the noise of a voxel, and a median by any amount."""
 SAME_GAIN = 0.02
 """Difference of two scans' contrast, as a share of it, that is left alone."""
-SAME_OFFSET = 0.1
-"""Difference of two scans' grey outside the lumen, in noises of a voxel, that is left alone: half of a noise (a lost
-intercept, a scanner that is not calibrated) cost every second wire, a quarter of one none."""
+SAME_OFFSET, SURE_OFFSET = 0.2, 5.0
+"""Difference of two scans' grey outside the lumen, in noises of theirs, that is left alone, and times the root of the
+voxels: a third of a noise (a lost intercept, a scanner that is not calibrated) cost every second wire, a fifth none."""
 SAME_NOISE = 0.5
 """The same in noises of a voxel, as an estimate from the darkest tenth may be off by that."""
 
@@ -62,7 +62,8 @@ def matched(
     low, offset = float(np.median(background[at][out])), float(np.median(grey[at][out]))
     seen = frame.values[tuple((region.sample + region.corner).T)].astype(float)
     more = _difference(seen - still, background[at] - low, deep, out)
-    apart = abs(offset) > SAME_OFFSET * spread((seen - still)[out])
+    sure = max(SAME_OFFSET, SURE_OFFSET / float(np.sqrt(np.count_nonzero(out))))
+    apart = abs(offset) > sure * spread((seen - still)[out])
     if more != 0.0 or apart:
         everywhere = tuple(voxels_of(region.runs).T)
         medium = np.float32(more) * (background[everywhere] - np.float32(low))

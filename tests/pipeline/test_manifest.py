@@ -10,11 +10,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pydantic import TypeAdapter, ValidationError
 
 from pipeline.load import Header, LoadError, Source, read_header
 from pipeline.load.curves import read_truth
 from pipeline.load.order import natural_key
 from pipeline.model import Array
+from pipeline.ranges import Name
 from pipeline.study.devices import implausible
 from pipeline.study.manifest import ManifestError, read_manifest
 from pipeline.study.plausible import in_case, measured_otherwise, odd_depths, odd_truth, other_voxels, wrapped_rolls
@@ -324,3 +326,11 @@ def test_another_voxel_size_than_the_scan_states_is_doubted(tmp_path: Path, spac
     found = other_voxels(read_header(path, spacing_mm=(0.5, 0.5, 5.0)))
     assert len(found) == said
     assert all("where the file has [0.5, 0.5, 0.5]; is that meant?" in text for text in found)
+
+
+def test_names_that_look_alike_are_one_or_refused() -> None:
+    """Groups "A", "A " and one with a character of no width were three insertions, with an interval over them."""
+    name: TypeAdapter[str] = TypeAdapter(Name)
+    assert name.validate_python(" A ") == "A"
+    with pytest.raises(ValidationError, match="has characters that are not seen"):
+        name.validate_python("A\u200b")

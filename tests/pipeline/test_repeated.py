@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from itertools import permutations, product
+from typing import cast
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from pipeline.arrays.fingerprint import known_by, known_with_place
 from pipeline.arrays.grids import towards_lps
 from pipeline.model import Curve, Volume
 from pipeline.run.stages.known import Frame
-from pipeline.run.stages.repeated import alike, kept, once
+from pipeline.run.stages.repeated import alike, kept, once, rescanned
 
 OBLIQUE = Rotation.from_rotvec([0.1, 0.2, -0.15]).as_matrix()
 
@@ -98,6 +99,17 @@ def test_a_scan_that_was_calibrated_with_is_known_by_its_trace() -> None:
     seen = once([learnt, other], traced_mm=[kept(learnt.curve).round(3)])
     assert [f.status for f in seen] == ["repeated", "ok"]
     assert "of a scan that was calibrated with (" in seen[0].message
+
+
+def test_an_insertion_that_looks_like_the_calibrated_one_scanned_again_is_told() -> None:
+    """With noise of its own in each scan it counted as blind, without a word."""
+    learnt = [kept(cast(Curve, traced(1.0, seed, 20.0 + seed).curve)) for seed in range(3)]
+    again = [traced(1.0, 10 + seed, 20.0 + seed) for seed in range(3)]
+    assert {f.status for f in once(again, traced_mm=learnt)} == {"ok"}
+    (said,) = rescanned(again, learnt)
+    assert said.startswith("frames 10, 11, 12 lie where scans that were calibrated with do")
+    assert not rescanned(again[:1], learnt), "at one depth two insertions may lie alike"
+    assert not rescanned([traced(1.0, seed, 40.0 + seed) for seed in range(3)], learnt)
 
 
 def test_own_curves_are_known_by_their_ends_alone() -> None:

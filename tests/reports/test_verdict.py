@@ -7,7 +7,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from reports.verdict import badge, in_short, unscored, verdict
+from reports.verdict import badge, in_short, of_these_alone, unscored, verdict
 from reports.what_next import next_command, typed, warned, worst_frames
 from reports.worse import worse_sentence
 from tests.reports.fake_results import FakeCase, write_run
@@ -45,6 +45,15 @@ def test_an_error_below_what_the_traces_are_known_to_is_told() -> None:
     assert "A perfect wire would lie 0.113 mm from these traces" in verdict(row)
     assert "perfect" not in verdict(row | {"rms_mm": 0.12})
     assert "perfect" not in verdict({"rms_mm": 0.037}), "of own curves nobody knows"
+
+
+def test_a_skill_of_one_insertion_says_nothing_of_others() -> None:
+    """Three insertions were "not shown to be better"; with one group for them the same wires were better, full stop."""
+    row = {"skill_strongest": 0.988, "strongest_null": "previous"}
+    alone = "interval withheld: 1 insertion, at least 3 needed"
+    assert of_these_alone(row | {"interval": alone}).startswith("It is of these insertions alone")
+    assert not of_these_alone(row | {"interval": "wide: 3 insertions"})
+    assert not of_these_alone(row | {"interval": alone, "skill_strongest": -0.1}), "that is worse, of whatever"
 
 
 @pytest.mark.parametrize(

@@ -16,12 +16,18 @@ from pipeline.compare.metrics import point_to_curve, rms
 from pipeline.model import Array, Curve
 from pipeline.run.stages.known import Frame
 from pipeline.status import FrameStatus
+from reports.case_files import listed
 
 ALIKE = 0.4
 """Distance between two traces over their standard deviation, below which they are of one wire that lay still: two scans
 of it with noise are traced up to twice the standard deviation apart (1.4 times along each of two axes), a scan that is
 written again with a grey more or less 0.02 to 0.3 times. With little noise that standard deviation is not noise's, and
 two scans cannot be told from one."""
+ONE_WIRE = 3.0
+"""The same of two scans of one wire, each with noise of its own: they are traced twice their standard deviation apart
+(1.4 times along each of two axes)."""
+LEAST_AGAIN = 2
+"""Frames from which that is no chance: at one depth two insertions may lie alike."""
 MOST_NAMED = 3
 STEP_MM = 2.0
 """Between the points that are kept of a trace."""
@@ -61,6 +67,24 @@ def alike(frames: Sequence[Frame]) -> list[str]:
     ]
 
 
+def rescanned(frames: Sequence[Frame], traced_mm: Sequence[ArrayLike]) -> list[str]:
+    """A warning where frames lie where scans that were calibrated with do: one insertion, scanned again.
+
+    traced_mm : points (n, 3) on their traces, as ``kept`` has them. Frames that are traced as one such scan are
+    ``repeated`` and not among these.
+    """
+    trusted = [frame for frame in frames if frame.trusted_curve is not None]
+    learnt = [(OF_CALIBRATION, np.asarray(points, dtype=np.float64)) for points in traced_mm]
+    again = [str(frame.index) for frame in trusted if _alike(frame, learnt, ONE_WIRE)]
+    if len(again) < max(LEAST_AGAIN, 0.5 * len(trusted)):
+        return []
+    return [
+        f"frames {listed(again)} lie where scans that were calibrated with do, as one insertion does that is scanned "
+        "again: what has taught the parameters is no test of them; take it out, unless the wire was drawn out and "
+        "pushed in again between the scans"
+    ]
+
+
 def kept(curve: Curve) -> Array:
     """Points (n, 3) on a trace by which its scan is known again, its tip the last."""
     return at_arc(curve.points_mm, samples(curve.length_mm, STEP_MM))
@@ -71,17 +95,20 @@ def _the_same(voxels: str, whose: str) -> str:
     return f"ends where {whose} does, to 0.01 mm" if voxels.startswith(TIP) else f"has the voxels of {whose}"
 
 
-def _alike(frame: Frame, earlier: Sequence[tuple[str, Array]]) -> str:
-    """As which earlier scan a frame is traced, in words; empty where as none, or where nobody knows how well it is."""
+def _alike(frame: Frame, earlier: Sequence[tuple[str, Array]], sigmas: float = ALIKE) -> str:
+    """As which earlier scan a frame is traced, in words; empty where as none, or where nobody knows how well it is.
+
+    sigmas : standard deviations of a trace by which it may be off.
+    """
     curve = frame.trusted_curve
     if curve is None:
         return ""
-    near = ALIKE * float(np.median(curve.sigma_mm))
+    near = sigmas * float(np.median(curve.sigma_mm))
     for whose, points in earlier:
-        if math.dist(points[-1], curve.points_mm[-1]) < ALIKE * curve.tip_sigma_mm:
+        if math.dist(points[-1], curve.points_mm[-1]) < sigmas * curve.tip_sigma_mm:
             apart = rms(point_to_curve(points, curve.points_mm)[0])
             if apart < near:
-                return f"is traced to within {apart:.2g} mm of {whose} (traces are known to {near / ALIKE:.2g} mm)"
+                return f"is traced to within {apart:.2g} mm of {whose} (traces are known to {near / sigmas:.2g} mm)"
     return ""
 
 

@@ -22,7 +22,7 @@ from pipeline.run.stages.dim_ends import faint_ends, own_dim_ends
 from pipeline.run.stages.gaps import own_gaps
 from pipeline.run.stages.known import Context, Frame, Known
 from pipeline.run.stages.own_curves import RESAMPLE, as_given, given_curves, rough
-from pipeline.run.stages.repeated import alike, once
+from pipeline.run.stages.repeated import alike, once, rescanned
 from pipeline.run.stages.thickness import too_thin
 from pipeline.run.stages.wire_free import wire_in_reference
 from pipeline.run.straightened import straightened
@@ -54,7 +54,7 @@ def trace_frames(run: Context, known: Known) -> Known:
     frames, doubtful_gaps = own_gaps(frames, voxel_mm)
     run.log.warnings += doubtful_gaps
     frames = _in_step(run, turned_round(frames), voxel_mm)
-    run.log.warnings += [*faint_ends(frames), *alike(frames)]
+    run.log.warnings += [*faint_ends(frames), *alike(frames), *rescanned(frames, run.case.calibrated_traces)]
     blur_mm = known.lumen.levels.get("scanner_blur_mm", float("nan"))
     run.log.warnings += too_thin(frames, blur_mm, run.case.wire.radius_mm, known.lumen.distance.spacing_mm)
     if not given:
