@@ -116,8 +116,9 @@ def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     """An object of JSON; TwiceError where a key stands twice with two values."""
     found: dict[str, Any] = {}
     for key, value in pairs:
-        if found.setdefault(key, value) != value:
+        if key in found and found[key] != value:
             raise TwiceError(f"two values of the key {key[:40]!r}")
+        found[key] = value
     return found
 
 
