@@ -2,7 +2,7 @@
 
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TextIO, cast
@@ -27,6 +27,10 @@ class Lasting:
         with self._without_reader():
             self._stream.write(text)
         return len(text)
+
+    def writelines(self, lines: Iterable[str]) -> None:
+        """Write texts; the stream's own would go past ``write``."""
+        self.write("".join(lines))
 
     def flush(self) -> None:
         """Flush; output that cannot be written is dropped."""

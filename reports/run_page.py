@@ -51,13 +51,13 @@ def render_index(out_dir: Path, embed: bool = False, each: Each = one_by_one) ->
     infos = list(runs.values())
     row = dict(whole.iloc[0]) if len(whole) else {}
     uncounted = damaged | set(summary["case"][summary["role"] == "calibration"])
-    missing = not_run(out_dir)
+    missing, doubts = not_run(out_dir), doubted(out_dir)
     mixed, cases_said = why_not_pooled(out_dir), zip(summary["role"], summary["status"], strict=True)
     why_none = mixed or unscored(cases_said) or not_reached(out_dir)
     status = _status(out_dir, [f for f in failures if not _of_another(f)], mixed) if cases else "failures"
     page = {
         **_headline(cases, missing, damaged),
-        **_judged(out_dir, cases, status, row, why_none),
+        **_judged(cases, doubts, status, row, why_none),
         **_worse_cases(summary, links),
         "worst": worst_frames({n: t for n, t in errors.items() if n not in uncounted}, links),
         # of several shards' commands none is the one of the run
@@ -66,7 +66,7 @@ def render_index(out_dir: Path, embed: bool = False, each: Each = one_by_one) ->
         "beside_others": (out_dir / SIMULATORS.file).exists(),
         **_not_counted(out_dir),
         "assumptions": assumed(out_dir),
-        "warnings": [*doubted(out_dir), *said_by_cases({case.name: case.result for case in cases}, "warnings")],
+        "warnings": [*doubts, *said_by_cases({case.name: case.result for case in cases}, "warnings")],
         "numbers": _content.in_tiles(_content.overall(declared("overall"), whole)),
         # the first stands beside the tiles: not the map of hundreds of cases, which is taller than a screen
         "sections": sorted(draw_sections("run", files, out_dir, embed, each), key=_is_tall),
@@ -155,11 +155,11 @@ def _simulator(cases: Sequence[CaseFiles]) -> str:
 
 
 def _judged(
-    out_dir: Path, cases: Sequence[CaseFiles], status: str, row: Mapping[str, Any], why_none: str
+    cases: Sequence[CaseFiles], doubts: Sequence[str], status: str, row: Mapping[str, Any], why_none: str
 ) -> dict[str, Any]:
     """Badge and verdict over all cases. row : of overall.csv.     why_none : why there may be no verdict."""
     copied = copied_from_traces({case.name: case.result.get("warnings", ()) for case in cases})
-    doubt = Doubt(copied, twins(doubted(out_dir)))
+    doubt = Doubt(copied, twins(doubts))
     said = " ".join(filter(None, (verdict(row, _simulator(cases), doubt), of_these_alone(row))))
     return {"badge": badge(status, status == "ok", row, doubt), "verdict": said or why_none}
 

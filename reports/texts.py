@@ -14,6 +14,8 @@ from typing import Any, BinaryIO
 
 from reports.toml_words import not_toml
 
+NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
+"""A number as people and programs write one: Python also takes 1_0 for 10, and digits of other scripts."""
 TEXT_BYTES, TOML_BYTES = 64 * 2**20, 16 * 2**20
 """Longest text (a curve, markups, a tree, a result), and longest TOML, which is parsed a hundred times as slowly."""
 DEEPEST, LARGEST = 50, 10**300

@@ -7,7 +7,7 @@ inside ``main``, so that --help is instant.
 import argparse
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -95,6 +95,13 @@ def unwritable(place: Path, option: str) -> list[str]:
             return []
     except OSError as error:
         return [f"{option} {place}: cannot be written: {error.strerror or error}; name a place where you may write"]
+
+
+def aside(lines: Iterable[str], *, quiet: bool) -> None:
+    """Lines that are not among the result, as warnings: with -q they go to stderr."""
+    to = sys.stderr if quiet else sys.stdout
+    to.writelines(f"{line}\n" for line in lines)
+    to.flush()
 
 
 def say(text: str) -> None:

@@ -1,11 +1,10 @@
 """``wireval calibrate MANIFEST -o OUT``: parameters from the cases marked role = "calibration"."""
 
 import argparse
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pipeline.commands import add_quiet, add_settings, resolved_settings, say
+from pipeline.commands import add_quiet, add_settings, aside, resolved_settings, say
 from pipeline.commands.given import file_of
 
 if TYPE_CHECKING:
@@ -73,9 +72,8 @@ def _fit(args: argparse.Namespace, cases: "tuple[Case, ...]", config: "Config", 
         say(f"{one.name:20s} {one.used:10g}  +- {sd:8s}{verdict}")
     if said := gained([vars(frame) for frame in fit.frames]):
         say(said)
-    to = sys.stderr if args.quiet else sys.stdout
-    for line in (*(f"warning: {text}" for text in (*misfit(fit), *flattened(found))), *found.left_out):
-        print(line, file=to, flush=True)
+    warnings = (f"warning: {text}" for text in (*misfit(fit), *flattened(found)))
+    aside([*warnings, *found.left_out], quiet=args.quiet)
     if before not in (b"", file.read_bytes()):
         say(f"{file}: that of a calibration before, which said otherwise, is replaced")
     seen = f"{len(written.estimate) - len(written.unseen)} of {len(written.estimate)} parameters seen"

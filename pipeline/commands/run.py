@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pipeline.commands import add_gates, add_settings, add_verbosity, resolved_settings, say, settings_of
+from pipeline.commands import add_gates, add_settings, add_verbosity, aside, resolved_settings, say, settings_of
 from pipeline.commands.given import INFERRED, add_calibrated, add_manifest, assumed_in, given
 
 if TYPE_CHECKING:
@@ -127,12 +127,10 @@ def _tell(plan: "Plan", totals: "Totals", closed: "Sequence[str]") -> None:
     from reports.verdict import remarks
     from reports.what_next import warned
 
-    warnings = warned(plan.out)
-    for line in [*failure_lines(plan), *closed, *(warnings if plan.template.quiet else ())]:
-        sys.stderr.write(f"{line}\n")
-    of_the_result = [f"warning: {text}" for text in remarks(totals.pooled)]
-    for line in [*(() if plan.template.quiet else warnings), *of_the_result]:
-        say(line)
+    sys.stderr.writelines(f"{line}\n" for line in (*failure_lines(plan), *closed))
+    aside(warned(plan.out), quiet=plan.template.quiet)
+    for text in remarks(totals.pooled):
+        say(f"warning: {text}")
 
 
 def _plan(args: argparse.Namespace) -> "Plan":

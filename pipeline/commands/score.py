@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pipeline.commands import add_gates, add_quiet, add_settings, resolved_settings, say
+from pipeline.commands import add_gates, add_quiet, add_settings, aside, resolved_settings, say
 from pipeline.commands.given import add_calibrated, file_of
 
 if TYPE_CHECKING:
@@ -68,9 +68,7 @@ def main(args: argparse.Namespace) -> int:
         (args.out / earlier).unlink(missing_ok=True)
     totals = _judged(plans, args.quiet)
     warnings = said_once({name: warned(plan.out) for name, plan in plans.items()})
-    for line in warnings if not args.quiet else ():
-        say(line)
-    sys.stderr.writelines(f"{line}\n" for line in warnings if args.quiet)
+    aside(warnings, quiet=args.quiet)
     for line in side_by_side(args.out, {name: plan.out for name, plan in plans.items()}, args.embed):
         say(line)
     closed, opened = _asked(gates, plans, totals, args.junit)

@@ -6,7 +6,7 @@ import numpy as np
 
 from pipeline.load.geometry import unusable
 from pipeline.load.guard import opened, size_of
-from pipeline.load.outside import beside, millimetres, numbered, numbers
+from pipeline.load.outside import beside, millimetres, numbered, numbers, said_twice
 from pipeline.load.voxels import Head, Placed, axes_of
 
 LONGEST_HEADER = 65536
@@ -67,8 +67,7 @@ def _tags(path: Path) -> tuple[dict[str, str], str, int]:
     for line in _text(start[:end]).splitlines():
         name, _, value = (part.strip() for part in line.partition("="))
         if tags.setdefault(name, value) != value and name != "Comment":
-            both = f"{name} = {tags[name][:40]} and {name} = {value[:40]}"
-            raise unusable(path, f"the header says {both}; allowed: one of them; correct the header")
+            raise said_twice(path, f"{name} = {tags[name][:40]}", f"{name} = {value[:40]}")
     return tags, _text(start[end:]), end
 
 
@@ -85,8 +84,7 @@ def _one_of(path: Path, tags: dict[str, str], names: tuple[str, ...]) -> str:
     given = [name for name in names if name in tags]
     for name in given[1:]:
         if tags[name].split() != tags[given[0]].split():
-            both = " and ".join(f"{one} = {tags[one][:40]}" for one in (given[0], name))
-            raise unusable(path, f"the header says {both}; allowed: one of them; correct the header")
+            raise said_twice(path, f"{given[0]} = {tags[given[0]][:40]}", f"{name} = {tags[name][:40]}")
     return given[0] if given else ""
 
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from pipeline.load.geometry import unusable
 from pipeline.load.guard import opened, size_of
-from pipeline.load.outside import beside, millimetres, numbered, numbers
+from pipeline.load.outside import beside, millimetres, numbered, numbers, said_twice
 from pipeline.load.voxels import Head, Placed, axes_of
 
 LONGEST_HEADER = 4 * 2**20
@@ -109,8 +109,7 @@ def _fields(path: Path) -> tuple[dict[str, str], int]:
             key = name if value.startswith("=") else ALIAS.get(name.strip().lower(), name.strip().lower())
             value = value.removeprefix("=").strip()
             if fields.setdefault(key, value) != value:
-                both = f"{key}: {fields[key][:40]} and {key}: {value[:40]}"
-                raise unusable(path, f"the header says {both}; allowed: one of them; correct the header")
+                raise said_twice(path, f"{key}: {fields[key][:40]}", f"{key}: {value[:40]}")
     if fields.get("data file", "").upper().startswith("LIST"):
         fields["data file"] += "\n" + text.partition(fields["data file"])[2]
     return fields, end

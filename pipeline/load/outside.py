@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.load.geometry import unusable
+from pipeline.load.geometry import LoadError, unusable
+from reports.texts import NUMBER
 
 UNITS_MM = {
     "mm": 1.0, "millimeter": 1.0, "millimetre": 1.0, "millimeters": 1.0, "um": 1e-3, "µm": 1e-3, "μm": 1e-3,
@@ -16,7 +17,7 @@ UNITS_MM = {
     "meters": 1e3, "nm": 1e-6,
 }  # fmt: skip
 MOST_PARTS = 100_000
-NUMBER = re.compile(r"%0?\d{0,2}d")
+PATTERN = re.compile(r"%0?\d{0,2}d")
 """The one pattern that a header may hold: a number. It goes to no printf of any library."""
 
 
@@ -29,8 +30,7 @@ def millimetres(what: object, unit: str) -> float:
     return UNITS_MM[name]
 
 
-WRITTEN = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?|[+-]?(?:nan|inf|infinity)", re.IGNORECASE)
-"""A number as programs write it: Python also takes 1_2.5 for 12.5, and digits of other scripts."""
+WRITTEN = re.compile(rf"{NUMBER}|[+-]?(?:nan|inf|infinity)", re.IGNORECASE)
 
 
 def to_number(text: str) -> float:
@@ -86,6 +86,11 @@ def numbers(
     return values
 
 
+def said_twice(what: object, one: str, other: str) -> LoadError:
+    """The error for a header that says two things."""
+    return unusable(what, f"the header says {one} and {other}; allowed: one of them; correct the header")
+
+
 def beside(header: Path, name: str) -> Path:
     """A file that a header names, in the header's own folder or below; LoadError for any other place."""
     part = Path(name)
@@ -98,7 +103,7 @@ def beside(header: Path, name: str) -> Path:
 def numbered(header: Path, words: list[str], count: int) -> list[Path]:
     """The files of a pattern as ``slice_%03d.raw 1 64 1``: their first number, last number and step."""
     name = words[0] if words else ""
-    if len(NUMBER.findall(name)) != 1 or "%" in NUMBER.sub("", name):
+    if len(PATTERN.findall(name)) != 1 or "%" in PATTERN.sub("", name):
         raise unusable(header, f"the pattern {name[:80]!r} of its data; allowed: one number, as in slice_%03d.raw")
     try:
         first, last, step = (*map(int, words[1:4]), *(1, count, 1)[len(words[1:4]) :])

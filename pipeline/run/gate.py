@@ -10,10 +10,9 @@ from typing import Any
 
 from pipeline.status import UsageError, did_you_mean
 from reports.schema import OURS, OVERALL_FILE, SUMMARY
+from reports.texts import NUMBER
 
 RELATIONS = {"<=": operator.le, ">=": operator.ge, "<": operator.lt, ">": operator.gt}
-NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
-"""As people write one: Python also takes 1_0 for 10, and digits of other scripts."""
 WRITTEN = re.compile(rf"\s*(?:([\w.-]+):)?\s*(\w+)\s*({'|'.join(RELATIONS)})\s*({NUMBER})\s*")
 
 

@@ -30,14 +30,14 @@ SAME_NOISE = 0.5
 """The same in noises of a voxel, as an estimate from the darkest tenth may be off by that."""
 
 
-def _difference(rest: Array, full: Array, deep: NDArray[np.bool_], out: NDArray[np.bool_]) -> float:
+def _difference(rest: Array, full: Array, deep: NDArray[np.bool_], out: NDArray[np.bool_], noise: float) -> float:
     """By how much the contrast differs, as a share of it; 0 for the same.
 
     rest : (n,) frame minus reference, both as they were scanned: smoothing lowers the middle of a narrow vessel.
     full : (n,) the background above what surrounds the vessel; less near the wall.  deep, out : which of the n voxels
-    lie well inside the lumen, and outside it.
+    lie well inside the lumen, and outside it.  noise : spread of ``rest`` there.
     """
-    noise, contrast = spread(rest[out]), float(np.median(full[deep]))
+    contrast = float(np.median(full[deep]))
     inner = deep & (full > 0.5 * contrast)
     if contrast < noise or np.count_nonzero(inner) < LEAST_LEVEL:
         return 0.0
@@ -61,9 +61,11 @@ def matched(
         return 1.0
     low, offset = float(np.median(background[at][out])), float(np.median(grey[at][out]))
     seen = frame.values[tuple((region.sample + region.corner).T)].astype(float)
-    more = _difference(seen - still, background[at] - low, deep, out)
+    rest = seen - still
+    noise = spread(rest[out])
+    more = _difference(rest, background[at] - low, deep, out, noise)
     sure = max(SAME_OFFSET, SURE_OFFSET / float(np.sqrt(np.count_nonzero(out))))
-    apart = abs(offset) > sure * spread((seen - still)[out])
+    apart = abs(offset) > sure * noise
     if more != 0.0 or apart:
         everywhere = tuple(voxels_of(region.runs).T)
         medium = np.float32(more) * (background[everywhere] - np.float32(low))

@@ -5,6 +5,8 @@ for two that are 2.7 voxels apart; in contact it is 0.06, twice as bright.
 """
 
 import math
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,55 +68,58 @@ def second_harmonic(ring: Array) -> NDArray[np.complex128]:
     return np.asarray(2.0 / ANGLES * np.exp(2j * PHI) @ ring)
 
 
-def out_of_round(image: Subtraction, points: Array, read: tuple[Array, Array]) -> tuple[Array, float]:
-    """Second harmonic (n,) of the ring's grey over the grey on the axis, along a curve (n, 3), and its noise where the
-    wire has its usual height.
+@dataclass(frozen=True, eq=False)
+class Section:
+    """What the cross-section looks like along a curve of n points.
 
-    read : of ``read_around``.
+    harmonic : second, of the ring's grey (n,).     grey : on the axis, averaged over OVER_MM (n,).
+    step_mm : between points.     window : weights of that average.     noise : of ``oblong`` where the wire has its
+    usual height.
     """
-    step = _step(points)
-    width = _width(points, step)
-    independent = max(1.0, min(OVER_MM, width * step) / (INDEPENDENT_VOXELS * image.voxel))
-    usual = float(np.median(np.convolve(read[1], np.ones(width) / width, "same")))
-    noise = image.noise_in(CREST_VOXELS) * np.sqrt(4.0 / ANGLES / independent) / max(usual, 1e-9)
-    return _oblong(points, read, 0.0), float(noise)
+
+    harmonic: NDArray[np.complex128]
+    grey: Array
+    step_mm: float
+    window: Array
+    noise: float
+
+    @cached_property
+    def oblong(self) -> Array:
+        """How far out of round it is (n,): the size of the harmonic's mean over the grey's."""
+        return self.turned(0.0)
+
+    def turned(self, twist: float) -> Array:
+        """The same of a section that turns by so many turns per mm."""
+        back = np.exp(-4j * np.pi * twist * self.step_mm * np.arange(len(self.grey)))
+        least = max(0.3 * float(np.median(self.grey)), 1e-9)
+        mean = np.convolve(self.harmonic * back, self.window, "same")
+        return np.asarray(np.abs(mean) / np.maximum(self.grey, least), float)
 
 
-def _step(points: Array) -> float:
-    return float(np.mean(np.linalg.norm(np.diff(points, axis=0), axis=1)))
-
-
-def _width(points: Array, step: float) -> int:
-    """Points that are averaged over."""
-    return min(len(points), max(1, round(OVER_MM / step)))
-
-
-def _oblong(points: Array, read: tuple[Array, Array], twist: float) -> Array:
-    """The size (n,) of the harmonic's mean over the grey's, for a section that turns by so many turns per mm."""
+def section_along(image: Subtraction, points: Array, read: tuple[Array, Array]) -> Section:
+    """The section along a curve (n, 3). read : of ``read_around``."""
     ring, grey = read
-    step = _step(points)
-    width = _width(points, step)
+    step = float(np.mean(np.linalg.norm(np.diff(points, axis=0), axis=1)))
+    width = min(len(points), max(1, round(OVER_MM / step)))
     window = np.ones(width) / width
     axis = np.convolve(grey, window, "same")
-    turned = second_harmonic(ring) * np.exp(-4j * np.pi * twist * step * np.arange(len(grey)))
-    least = max(0.3 * float(np.median(axis)), 1e-9)
-    return np.asarray(np.abs(np.convolve(turned, window, "same")) / np.maximum(axis, least), float)
+    independent = max(1.0, min(OVER_MM, width * step) / (INDEPENDENT_VOXELS * image.voxel))
+    usual = max(float(np.median(axis)), 1e-9)
+    noise = float(image.noise_in(CREST_VOXELS) * np.sqrt(4.0 / ANGLES / independent) / usual)
+    return Section(second_harmonic(ring), axis, step, window, noise)
 
 
-def paired(image: Subtraction, points: Array, read: tuple[Array, Array], noise: float, length_mm: float) -> float:
-    """How far out of round the whole line (n, 3) is, over what one wire's may be: above 1 it is two in contact all
-    along, side by side or turned about each other.
+def paired(image: Subtraction, section: Section, length_mm: float) -> float:
+    """How far out of round the whole line is, over what one wire's may be: above 1 it is two in contact all along, side
+    by side or turned about each other.
 
-    read : of ``read_around``.     noise : of ``out_of_round``, whose median over the line is that of noise alone where
-    the wire is round.
+    Where the wire is round, the median over the line is that of noise alone.
     """
     independent = max(1.0, length_mm / OVER_MM)
     uneven = float(np.max(image.spacing) / np.min(image.spacing)) - 1.0
-    left = []
-    for twist in (0.0, *TWISTS):
-        sure = SURE_TWISTED if twist else SURE
-        of_noise = MEDIAN * noise * (1.0 + sure / np.sqrt(independent))
-        left.append(float(np.median(_oblong(points, read, twist))) ** 2 - of_noise**2)
+    tried = [(section.oblong, SURE), *((section.turned(twist), SURE_TWISTED) for twist in TWISTS)]
+    of_noise = MEDIAN * section.noise
+    left = [float(np.median(o)) ** 2 - (of_noise * (1.0 + sure / np.sqrt(independent))) ** 2 for o, sure in tried]
     return float(np.sqrt(max(0.0, *left))) / (PAIRED * (1.0 + uneven))
 
 

@@ -20,7 +20,7 @@ from pipeline.trace.ends import (
 )
 from pipeline.trace.link import extended, resampled
 from pipeline.trace.profile import LEAST_LEVEL, Steps
-from pipeline.trace.section import out_of_round, paired, read_around
+from pipeline.trace.section import paired, read_around, section_along
 from pipeline.trace.strands import BESIDE_VOXELS, DOUBLE, doubled, of_one_strand
 from pipeline.trace.subtraction import CREST_VOXELS, Subtraction
 from pipeline.trace.tube import Tube
@@ -153,16 +153,16 @@ def judge(image: Subtraction, attempt: Attempt, points: Array, bridged: NDArray[
     known = seen_steps(attempt.tube.steps, _shares(attempt.tube, points))
     faint = (share < FAINT + noise) & (ends > MEAN_OVER_MM) & ~known
     read = read_around(image, points, attempt.tube.sigma)
-    oblong, doubtful = out_of_round(image, points, read)
+    section = section_along(image, points, read)
     double = beside_itself(points, step, BESIDE_VOXELS * image.voxel)
     if not image.thick_slices:
         alone = share / of_one_strand(share, (ends > MEAN_OVER_MM) & ~bridged & ~faint)
-        double |= doubled(alone, oblong, np.maximum(DOUBLE, 1.0 + 4.0 * noise), doubtful)
+        double |= doubled(alone, section.oblong, np.maximum(DOUBLE, 1.0 + 4.0 * noise), section.noise)
     outside = _outside(image, points)
     faint_mm, double_mm = (float(np.count_nonzero(m)) * step for m in (faint & ~bridged, double))
     objections = of_the_way(attempt, length_mm)
     objections += _of_the_line(image, attempt, points, (share, noise, outside), (faint_mm, double_mm, length_mm))
-    pair = 0.0 if image.thick_slices else paired(image, points, read, doubtful, length_mm)
+    pair = 0.0 if image.thick_slices else paired(image, section, length_mm)
     objections += of_a_pair(pair, attempt)
     folded = bool(beside_itself(points, step, TIP_BESIDE * image.voxel)[-1])
     objections += of_the_ends(image, attempt, points, length_mm, folded=folded)

@@ -19,6 +19,7 @@ import SimpleITK as sitk
 
 from pipeline.cli import main
 from pipeline.run.gate import Gate, gate
+from pipeline.streams import Lasting
 from pipeline.study.explain import described
 from pipeline.study.settings import Config, SettingsError, parse_assignment, read_settings, resolve
 from pipeline.wording import in_words
@@ -329,6 +330,17 @@ def test_a_gate_closes_on_the_limit_s_far_side_and_on_nothing_to_go_by() -> None
     assert "no case was scored" in gate("rms_mm>0.5").closed({})
     for nothing in ({}, {"rms_mm": None}, {"rms_mm": float("nan")}):
         assert "cannot be shown" in gate("rms_mm>0.5").closed(nothing)
+
+
+def test_lines_that_are_written_at_once_outlast_their_reader() -> None:
+    """The stream's own ``writelines`` went past what discards them."""
+    read, write = os.pipe()
+    os.close(read)
+    with os.fdopen(write, "w", encoding="utf-8") as gone:
+        stream = Lasting(gone)
+        stream.writelines(["a line\n"] * 20_000)
+        stream.flush()
+    assert not stream.lost, "a reader that has gone is no full disk"
 
 
 def test_a_wrong_gate_is_refused_before_what_takes_seconds_is_imported() -> None:

@@ -42,7 +42,7 @@ def once(frames: Sequence[Frame], calibrated: Collection[str] = (), traced_mm: S
     calibrated : ``Frame.voxels`` of these scans.     traced_mm : points (n, 3) on their traces, as ``kept`` has them.
     """
     out, first = list(frames), dict[str, int]()
-    learnt = [(OF_CALIBRATION, np.asarray(points, dtype=np.float64)) for points in traced_mm]
+    learnt = _learnt(traced_mm)
     for n, frame in enumerate(frames):
         same = first.setdefault(frame.voxels, n)
         whose = OF_CALIBRATION if frame.voxels in calibrated else f"frame {same}" if frame.voxels and same != n else ""
@@ -74,7 +74,7 @@ def rescanned(frames: Sequence[Frame], traced_mm: Sequence[ArrayLike]) -> list[s
     ``repeated`` and not among these.
     """
     trusted = [frame for frame in frames if frame.trusted_curve is not None]
-    learnt = [(OF_CALIBRATION, np.asarray(points, dtype=np.float64)) for points in traced_mm]
+    learnt = _learnt(traced_mm)
     again = [str(frame.index) for frame in trusted if _alike(frame, learnt, ONE_WIRE)]
     if len(again) < max(LEAST_AGAIN, 0.5 * len(trusted)):
         return []
@@ -88,6 +88,10 @@ def rescanned(frames: Sequence[Frame], traced_mm: Sequence[ArrayLike]) -> list[s
 def kept(curve: Curve) -> Array:
     """Points (n, 3) on a trace by which its scan is known again, its tip the last."""
     return at_arc(curve.points_mm, samples(curve.length_mm, STEP_MM))
+
+
+def _learnt(traced_mm: Sequence[ArrayLike]) -> list[tuple[str, Array]]:
+    return [(OF_CALIBRATION, np.asarray(points, dtype=np.float64)) for points in traced_mm]
 
 
 def _the_same(voxels: str, whose: str) -> str:
