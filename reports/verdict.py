@@ -42,7 +42,7 @@ def verdict(statistics: Mapping[str, Any], simulator: str = "", doubt: Doubt = N
     sentence += f"; 95 % of its points lie within {tail} mm." if tail != NOTHING else "."
     true = number(statistics.get("truth_rms_mm"))
     sentence += f" From the true wire it lies {true} mm." * (true != NOTHING)
-    sentence += _at_the_floor(statistics)
+    sentence += _at_the_floor(statistics) + _beyond_inputs(statistics)
     again = f"But {TWINS} that was scanned again, and count as several: see the warnings." * bool(doubt.twins)
     return " ".join(filter(None, (sentence, *remarks(statistics, simulator), _against(statistics), again)))
 
@@ -57,6 +57,22 @@ def _at_the_floor(statistics: Mapping[str, Any]) -> str:
     if not _number(statistics.get("rms_mm")) <= floor:
         return ""
     return f" A perfect wire would lie {number(floor)} mm from these traces: nothing less tells one wire from another."
+
+
+BEYOND_INPUTS = 0.1
+"""Share of points beyond 2 u, of which chance makes 0.05, that is said beside the error itself: a wire that is better
+than a guess, and for that ok, may still be farther off than anything that is not known of it explains."""
+
+
+def _beyond_inputs(statistics: Mapping[str, Any]) -> str:
+    """How much of an error is larger than its uncertainty, where that is more than chance."""
+    share = _number(statistics.get("share_beyond_2u"))
+    if not share > BEYOND_INPUTS:
+        return ""
+    return (
+        f" {100 * share:.0f} % of its points lie farther off than trace and inputs explain (5 % would by chance): there "
+        "the model is wrong, or an input is less certain than stated."
+    )
 
 
 WORSE = "worse than a guess"

@@ -11,10 +11,10 @@ from pipeline.trace.ahead import dark_ahead, hidden_ahead
 from pipeline.trace.attempt import Attempt
 from pipeline.trace.onward import GOES_ON, seen_outside
 from pipeline.trace.reach import end_range
-from pipeline.trace.section import fills_vessel
+from pipeline.trace.section import STRETCH_MM, fills_vessel
 from pipeline.trace.subtraction import Subtraction
 from pipeline.trace.tube import Tube
-from pipeline.trace.width import OUT_OF_ROUND, WIDE, as_fitted, oblong_end, wide_end
+from pipeline.trace.width import OUT_OF_ROUND, WIDE, oblong_end, wide_end
 
 EDGE_VOXELS, OUTSIDE_VOXELS = 2.0, -1.0
 """Distance from the scan's end within which a curve's end is no tip: traces of wires that leave the scan end 1.0 inside
@@ -98,6 +98,8 @@ def _end_range(image: Subtraction, attempt: Attempt) -> tuple[float, float, floa
     return *end_range(image, attempt.tube), most_mm
 
 
+Look = tuple[Array, Array]
+"""Grey on rings about a curve's points and on its axis, as of ``read_around``."""
 Objection = tuple[bool, FrameStatus, str, str, str]
 """Whether it holds, the status that it gives, what was found, what is allowed and what to do."""
 
@@ -148,16 +150,15 @@ def of_the_ends(
 
 
 def of_its_width(
-    image: Subtraction, attempt: Attempt, points: Array, read: tuple[Array, Array], *, folded: bool
+    image: Subtraction, attempt: Attempt, points: Array, looks: tuple[Look, Look], *, folded: bool
 ) -> tuple[Objection, ...]:
     """Why a curve's (n, 3) end may be something else than the wire's. Beside another strand nobody sees its width.
 
-    read, folded : of ``read_around``, as in ``of_the_ends``.
+    looks : of ``read_around`` and ``as_fitted``.     folded : as in ``of_the_ends``.
     """
     wide = oblong = 0.0
     if not (image.thick_slices or folded):
-        fitted = as_fitted(image, attempt.tube, points)
-        wide, oblong = wide_end(image, attempt.tube, points, read, fitted), oblong_end(image, points, read, fitted)
+        wide, oblong = wide_end(image, attempt.tube, points, *looks), oblong_end(image, points, *looks)
     return (
         (wide > 0.0, FrameStatus.TRACE_AMBIGUOUS,
          f"an end {wide:.2f} times as wide as the line before it", f"{WIDE[0]:g} times at most",
@@ -179,10 +180,11 @@ def of_the_way(attempt: Attempt, length_mm: float) -> tuple[Objection, ...]:
 
 
 def of_a_pair(pair: float, attempt: Attempt) -> tuple[Objection, ...]:
-    """Why a curve may be two wires in contact all along: evenly bright like one, but its line lies midway."""
+    """Why a curve may be two wires in contact: evenly bright like one, but its line lies midway."""
     return (
         (pair > 1.0 and not attempt.from_previous, FrameStatus.TRACE_AMBIGUOUS,
-         f"a line that is out of round all along, {pair:.1f} times as much as one wire may be", "a round one",
+         f"a line that is out of round over {STRETCH_MM:g} mm and more, {pair:.1f} times as much as one wire may be",
+         "a round one",
          "look for a second wire in contact with it, midway to which the line lies, or list a frame with one before"),
     )  # fmt: skip
 

@@ -30,6 +30,11 @@ MEDIAN = 1.18
 """Median of a complex number's size over the standard deviation of its parts."""
 SURE = 2.0
 """Three standard deviations of the median of n independent ones, over that median, times the square root of n."""
+STRETCH_MM, STRETCHED, SURE_STRETCH = 10.0, 0.024, 3.0
+"""Length over which alone two wires may lie so that they are seen as two, the mean harmonic there from which they are,
+and standard deviations of that mean: bends turn the offset of a copy moved aside into the wires' own direction, and the
+rest of the line is as round as one. Right lines have up to 0.015 beyond noise where the background was measured; where
+it is modelled 0.032, and stretches are not asked."""
 TWISTS, SURE_TWISTED = (-0.2, -0.15, -0.1, -0.05, 0.05, 0.1, 0.15, 0.2), 2.7
 """Turns per mm of two wires about each other that are looked for, so near each other that what is averaged over OVER_MM
 stays in phase: pitches from 4.5 mm up. Four standard deviations, as the largest of several is taken."""
@@ -116,11 +121,30 @@ def paired(image: Subtraction, section: Section, length_mm: float) -> float:
     Where the wire is round, the median over the line is that of noise alone.
     """
     independent = max(1.0, length_mm / OVER_MM)
-    uneven = float(np.max(image.spacing) / np.min(image.spacing)) - 1.0
     tried = [(section.oblong, SURE), *((section.turned(twist), SURE_TWISTED) for twist in TWISTS)]
     of_noise = MEDIAN * section.noise
     left = [float(np.median(o)) ** 2 - (of_noise * (1.0 + sure / np.sqrt(independent))) ** 2 for o, sure in tried]
-    return float(np.sqrt(max(0.0, *left))) / (PAIRED * (1.0 + uneven))
+    return float(np.sqrt(max(0.0, *left))) / (PAIRED * (1.0 + _unevenness(image)))
+
+
+def paired_in_part(image: Subtraction, section: Section, fitted: NDArray[np.complex128]) -> float:
+    """The same over STRETCH_MM alone, where that says most; 0 where the background is modelled.
+
+    fitted : harmonic (n,) of the fitted tube, which is not round on the rings of a sharp bend.
+    """
+    width = round(STRETCH_MM / section.step_mm)
+    if image.modelled or width > len(section.grey):
+        return 0.0
+    window, usual = np.ones(width) / width, max(float(np.median(section.grey)), 1e-9)
+    grey = np.maximum(np.convolve(section.grey, window, "valid"), usual)  # that of a coil is its own
+    of_noise = SURE_STRETCH * section.noise * np.sqrt(OVER_MM / STRETCH_MM) * usual
+    mean = np.abs(np.convolve(section.harmonic - fitted, window, "valid"))
+    beyond = np.sqrt(np.maximum(0.0, mean**2 - of_noise**2)) / grey
+    return float(beyond.max()) / (STRETCHED * (1.0 + _unevenness(image)))
+
+
+def _unevenness(image: Subtraction) -> float:
+    return float(np.max(image.spacing) / np.min(image.spacing)) - 1.0
 
 
 def fills_vessel(image: Subtraction, points: Array, sigma: float) -> bool:

@@ -20,10 +20,11 @@ from pipeline.trace.ends import (
 )
 from pipeline.trace.link import extended, resampled
 from pipeline.trace.profile import LEAST_LEVEL, Steps
-from pipeline.trace.section import paired, read_around, section_along
+from pipeline.trace.section import Section, paired, paired_in_part, read_around, second_harmonic, section_along
 from pipeline.trace.strands import BESIDE_VOXELS, DOUBLE, doubled, of_one_strand
 from pipeline.trace.subtraction import CREST_VOXELS, Subtraction
 from pipeline.trace.tube import Tube
+from pipeline.trace.width import as_fitted
 
 LEAST_CNR = 2.5
 """Contrast over noise below which a frame alone does not give a curve."""
@@ -162,14 +163,22 @@ def judge(image: Subtraction, attempt: Attempt, points: Array, bridged: NDArray[
     faint_mm, double_mm = (float(np.count_nonzero(m)) * step for m in (faint & ~bridged, double))
     objections = of_the_way(attempt, length_mm)
     objections += _of_the_line(image, attempt, points, (share, noise, outside), (faint_mm, double_mm, length_mm))
-    pair = 0.0 if image.thick_slices else paired(image, section, length_mm)
-    objections += of_a_pair(pair, attempt)
     folded = bool(beside_itself(points, step, TIP_BESIDE * image.voxel)[-1])
+    fitted = as_fitted(image, attempt.tube, points)
+    pair = 0.0 if image.thick_slices else _pair(image, section, fitted, length_mm)
+    objections += of_a_pair(pair, attempt)
     objections += of_the_ends(image, attempt, points, length_mm, folded=folded)
-    objections += of_its_width(image, attempt, points, read, folded=folded)
+    objections += of_its_width(image, attempt, points, (read, fitted), folded=folded)
     objections += of_the_whole(image, attempt, points, length_mm)
     first = next(((status, note_of(*why)) for holds, status, *why in objections if holds), (FrameStatus.OK, ""))
     return Verdict(*first, bridged | faint | double | outside, faint_mm, double_mm)
+
+
+def _pair(image: Subtraction, section: Section, fitted: tuple[Array, Array], length_mm: float) -> float:
+    """How far out of round the line is, all along or in part, over what one wire's may be."""
+    return max(
+        paired(image, section, length_mm), paired_in_part(image, section, np.asarray(second_harmonic(fitted[0])))
+    )
 
 
 def _of_the_line(

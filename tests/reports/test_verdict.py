@@ -47,6 +47,14 @@ def test_an_error_below_what_the_traces_are_known_to_is_told() -> None:
     assert "perfect" not in verdict({"rms_mm": 0.037}), "of own curves nobody knows"
 
 
+def test_an_error_that_inputs_do_not_explain_is_told() -> None:
+    """A green "ok" stood beside 12 to 60 % of points beyond 2 u: one had to look for the number."""
+    row = {"rms_mm": 0.4, "share_beyond_2u": 0.31}
+    assert " 31 % of its points lie farther off than trace and inputs explain (5 % would by chance)" in verdict(row)
+    assert "explain" not in verdict(row | {"share_beyond_2u": 0.06})
+    assert "explain" not in verdict({"rms_mm": 0.4}), "where no budget was asked for"
+
+
 def test_a_skill_of_one_insertion_says_nothing_of_others() -> None:
     """Three insertions were "not shown to be better"; with one group for them the same wires were better, full stop."""
     row = {"skill_strongest": 0.988, "strongest_null": "previous"}

@@ -9,7 +9,7 @@ import numpy as np
 from pipeline.arrays.fingerprint import known_by
 from pipeline.arrays.grids import corners_mm
 from pipeline.load import Crop, Header
-from pipeline.model import Curve, Volume
+from pipeline.model import Curve, Lumen, Volume
 from pipeline.register import Motion
 from pipeline.register.frames import Alignment, alignment_of, counters_of, put_in_place, sentences_of, widened
 from pipeline.run.helpers import Earlier
@@ -23,7 +23,7 @@ from pipeline.run.stages.gaps import own_gaps
 from pipeline.run.stages.known import Context, Frame, Known
 from pipeline.run.stages.own_curves import RESAMPLE, as_given, given_curves, rough
 from pipeline.run.stages.repeated import alike, once, rescanned
-from pipeline.run.stages.thickness import too_thin
+from pipeline.run.stages.thickness import not_too_thick, too_thin
 from pipeline.run.stages.wire_free import wire_in_reference
 from pipeline.run.straightened import straightened
 from pipeline.segment.opened import opened
@@ -55,8 +55,7 @@ def trace_frames(run: Context, known: Known) -> Known:
     run.log.warnings += doubtful_gaps
     frames = _in_step(run, turned_round(frames), voxel_mm)
     run.log.warnings += [*faint_ends(frames), *alike(frames), *rescanned(frames, run.case.calibrated_traces)]
-    blur_mm = known.lumen.levels.get("scanner_blur_mm", float("nan"))
-    run.log.warnings += too_thin(frames, blur_mm, run.case.wire.radius_mm, known.lumen.distance.spacing_mm)
+    run.log.warnings += too_thin(frames, known.lumen, run.case.wire.radius_mm)
     if not given:
         run.log.warnings += cut_off([(f.index, curve) for f in frames if (curve := f.trusted_curve) is not None])
     run.log.warnings += beside_what_is_seen(frames, [part.seen for part in parts], run.config.trace, voxel_mm)
@@ -166,7 +165,7 @@ class _Tracing:
         log.count("trace", counters_of(registration))
         frame = replace(frame, registration=registration, voxels=known_by(volume))
         seen = widened(self.follow(run, frame, here, earlier), registration)
-        done = _of_scan(run, frame, seen)
+        done = _of_scan(run, frame, seen, self.lumen)
         if self.given:
             done = as_given(run, frame, self.given[frame.index], self.lumen.distance)
         before = (earlier(k) for k in range(frame.index))
@@ -194,8 +193,10 @@ class _Tracing:
         return saturated(seen, here)
 
 
-def _of_scan(run: Context, frame: Frame, curve: Curve) -> Frame:
+def _of_scan(run: Context, frame: Frame, curve: Curve, lumen: Lumen) -> Frame:
     """The frame with the wire that its scan shows."""
+    if not frame.catheter_mm > 0.0:
+        curve = not_too_thick(curve, lumen, run.case.wire.radius_mm)
     if run.case.catheter is not None and np.isnan(frame.expected_mm):
         curve = of_catheter(curve, frame.catheter_mm)
     return frame.traced_by(curve)
