@@ -100,7 +100,8 @@ def _bent(found: Sequence[tuple[int, Bent]]) -> list[str]:
         f"frame{'s' * (len(found) > 1)} {', '.join(str(n) for n, _ in found)}: the vessel's wall fits no rigid motion "
         f"of the phantom, up to {worst.rms_voxels:.2f} voxel rms are left (frame {number}, {worst.most_voxels:.2f} at "
         f"LPS mm ({place})): it is soft and bends, the wire pushes it aside, or slices of the scan lie "
-        "aside; traces may lie beside the lumen by as much, which trace_sigma_mm includes; hold the vessel in place all along, and scan it anew"
+        "aside; traces may lie beside the lumen by as much, which trace_sigma_mm includes; hold the vessel in place "
+        "all along, and scan it anew"
     ]
 
 
