@@ -17,6 +17,7 @@ from pipeline.segment.config import SegmentConfig
 from pipeline.segment.contact import contacts, warning
 from pipeline.segment.cut_off import cut_off
 from pipeline.segment.ends import ends
+from pipeline.segment.flat_side import flat_side
 from pipeline.segment.fuzzy import fuzzy_region
 from pipeline.segment.layered import layer_around, surrounded, with_layer_alone
 from pipeline.segment.levels import Region, brighter, scanner_blur
@@ -133,7 +134,12 @@ def segment(
         add_balls(wall.values, np.asarray(grid.spacing_mm), thin, config.outer_mm)
     other = brighter(wall.levels, wire_radius_mm is not None) + bright + uneven.warning(found.least)
     said: tuple[str, ...] = () if found.layer is None else (surrounded(found.layer, float(np.mean(grid.spacing_mm))),)
-    said += cut_off(scan, found.distance, site.corner) + warning(open_ones) + valley.warning(grid, region.passing)
+    said += (
+        cut_off(scan, found.distance, site.corner)
+        + flat_side(found.distance)
+        + warning(open_ones)
+        + valley.warning(grid, region.passing)
+    )
     said += other or bone.two_greys(grid, found.distance, site.corner, wall.levels, wall.blur_mm)
     box = wall.values, site.corner
     said += add_necks(region.necks, box, grid, region.levels, blur)
