@@ -27,6 +27,8 @@ Reach = Annotated[float, Field(ge=0.1, le=50, allow_inf_nan=False), Number]
 """A distance beside a vessel or along it, mm."""
 Depth = Annotated[float, Field(gt=0, le=5000, allow_inf_nan=False), Number]
 """Insertion depth, mm: no wire is longer than 5 m."""
+Offset = Annotated[float, Field(ge=-50, le=50, allow_inf_nan=False), Number]
+"""What stated depths are off by, mm."""
 Factor = Annotated[float, Field(ge=1e-6, le=1e6, allow_inf_nan=False), Number]
 Friction = Annotated[float, Field(ge=0, le=10, allow_inf_nan=False), Number]
 """Coulomb's coefficient: a hydrophilic wire has 0.01 to 0.1."""

@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, StrictBool, ValidationError
 
 from pipeline.load.geometry import LoadError
 from pipeline.load.guard import read_toml, status_of
-from pipeline.ranges import Finite, FiniteProfile, NonNegative, Point, Positive, PositiveProfile
+from pipeline.ranges import Finite, FiniteProfile, Friction, NonNegative, Offset, Point, Positive, PositiveProfile, Turn
 from pipeline.status import InputError
 from pipeline.wording import said, sentences
 
@@ -41,8 +41,8 @@ class Found(Table):
     name: str
     value: Finite
     sd: NonNegative
-    logarithmic: bool
-    seen: bool
+    logarithmic: StrictBool
+    seen: StrictBool
     used: Finite
     why: str = ""
 
@@ -80,10 +80,10 @@ class Parameters(Table):
     wire: str
     bending_stiffness_N_mm2: PositiveProfile
     rest_curvature_per_mm: FiniteProfile
-    friction: NonNegative
-    roll_offset_deg: Finite
-    depth_offset_mm: Finite
-    absolute_stiffness: bool
+    friction: Friction
+    roll_offset_deg: Turn
+    depth_offset_mm: Offset
+    absolute_stiffness: StrictBool
     wall: tuple[WallFound, ...]
     stated: Stated | None = None
     estimate: tuple[Found, ...] = ()

@@ -344,6 +344,9 @@ def test_one_frame_in_common_is_enough(study):
     ("change", "told"),
     [
         (("friction = 0.03", "friction = -1"), "friction"),
+        (("friction = 0.03", "friction = 50.0"), "friction = 50.0: expected a number from 0 to 10"),
+        (("depth_offset_mm = 0.4", "depth_offset_mm = -1e9"), "depth_offset_mm = .*: expected a number from -50 to 50"),
+        (("absolute_stiffness = false", 'absolute_stiffness = "yes"'), "absolute_stiffness = .yes.: expected true or"),
         (('wire = "w"', 'wire = "other"'), "its wire is 'w', the parameters are those of 'other'"),
         (("schema = 1", "schema = 1\nroll = 3"), "unknown key"),
         (
