@@ -34,8 +34,9 @@ class Insertions:
     insertions : they may have gone some way already, and may go on alone afterwards. Wires whose walls are made from
     one another by ``VesselWall.like`` go in lock-step, POOL of them in WIDTH lanes. Each ends where it would alone, to
     rounding (1e-9 mm, away from snaps); a straight wire, which alone is swept without its roll, in 1 % of depths to the
-    tolerance of a relaxation (1e-5 mm). Insertions with friction, a finite torsional stiffness, a sampled hull, a
-    shaft with friction, a weight, no wall or the closed form go alone.
+    tolerance of a relaxation (1e-5 mm), and at a fork, once in 10,000 depths, perhaps on its other side. Insertions
+    with friction, a finite torsional stiffness, a sampled hull, a shaft with friction, a weight, no wall or the closed
+    form go alone.
     threads : how many to use (default: one per core); they run without Python's global lock.
     Raises ValueError where one insertion is given twice, or with a catheter.
     """
