@@ -70,8 +70,8 @@ def _beyond_inputs(statistics: Mapping[str, Any]) -> str:
     if not share > BEYOND_INPUTS:
         return ""
     return (
-        f" {100 * share:.0f} % of its points lie farther off than trace and inputs explain (5 % would by chance): there "
-        "the model is wrong, or an input is less certain than stated."
+        f" {100 * share:.0f} % of its points lie farther off than trace and inputs explain (5 % would by chance): "
+        "there the model is wrong, or an input is less certain than stated."
     )
 
 

@@ -110,6 +110,12 @@ def _beside_wire(grid: Grid, seeds_mm: ArrayLike, config: SegmentConfig, wire_mm
     return _around_wire(grid, found, seeds_mm, config, wire_mm)
 
 
+def _of_the_vessel(scan: Grid, found: _Found) -> tuple[str, ...]:
+    """Sentences on what surrounds it, and fills it."""
+    layer = () if found.layer is None else (surrounded(found.layer, float(np.mean(found.grid.spacing_mm))),)
+    return layer + cut_off(scan, found.distance, found.site.corner) + flat_side(found.distance)
+
+
 def segment(
     volume: Volume, seeds_mm: ArrayLike, config: SegmentConfig | None = None, wire_radius_mm: float | None = None
 ) -> Lumen:

@@ -202,7 +202,11 @@ def of_the_whole(image: Subtraction, attempt: Attempt, points: Array, length_mm:
     """Why a curve (n, 3) may be no wire, or not one."""
     step = length_mm / max(1, len(points) - 1)
     turn = sharpest_turn_deg(points[: -max(1, round(J_MM / max(step, 1e-9)))], step, HAIRPIN_VOXELS * image.voxel)
+    copied = image.levels.get("copied", 0.0)
     return (
+        (copied > 0.0, FrameStatus.TRACE_AMBIGUOUS,
+         f"{100 * copied:.0f} % of the lumen's voxels as the reference has them, to the last bit", "a scan of its own",
+         "look whether the frame was written whole; export it again"),
         (image.slices_apart >= MOST_APART, FrameStatus.TRACE_AMBIGUOUS,
          f"slices {image.slices_apart:.1f} times as far apart as pixels",
          f"less than {MOST_APART} times",

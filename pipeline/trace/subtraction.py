@@ -20,6 +20,7 @@ from pipeline.arrays.lattice import sparse_zeros
 from pipeline.model import Array, Lumen, Volume
 from pipeline.trace._kernels.runs import subtract
 from pipeline.trace._kernels.tube import active_voxels
+from pipeline.trace.copied import copied_share
 from pipeline.trace.gain import matched
 from pipeline.trace.region import HALO_VOXELS, SearchRegion, background_of, region_of, voxels_of, wall_blur
 from solver.grid import Grid
@@ -184,6 +185,8 @@ def subtracted(frame: Volume, lumen: Lumen, reference: Volume | None) -> Subtrac
     counters = {"voxels_total": total, "voxels_read": read, "voxels_skipped": total - read}
     blur = wall_blur(lumen, float(np.min(region.box.spacing_mm)))
     modelled, levels = reference is None or gain != 1.0, {"noise": noise, "gain": gain}
+    if still is not None:
+        levels["copied"] = copied_share(grid.values[tuple((region.sample + region.corner).T)], still)
     uneven = modelled and lumen.levels.get("least_filling", 1.0) < UNEVEN
     return Subtraction(region, grey, max(noise, 1e-6), modelled, blur, grid, uneven, counters, levels)
 

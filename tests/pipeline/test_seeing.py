@@ -264,6 +264,27 @@ def test_a_second_wire_that_is_a_copy_moved_aside_is_seen_in_part(seed):
     assert "out of round over 10 mm" in curve.note
 
 
+@pytest.mark.parametrize("seed", [1, 4, 2])
+def test_a_frame_of_which_a_part_is_the_reference_is_no_scan_of_the_wire(seed):
+    """The wire was cut where the copy began, by half of it, ok; a whole frame is as before."""
+    rng = np.random.default_rng([seed, 12])
+    scene = Draft(rng).scan((8, 16)[seed % 2])
+    values = np.array(scene.frame.values)
+    middle, towards = scene.wire[len(scene.wire) // 2], scene.wire[-1] - scene.wire[len(scene.wire) // 2]
+    axis = int(np.argmax(np.abs(towards)))
+    first = int(scene.frame.to_index(middle[None])[0][axis])
+    part = [slice(None)] * 3
+    part[axis] = slice(first, None) if towards[axis] > 0 else slice(None, first)
+    lumen = segment(scene.reference, scene.entry[None])
+    if seed != 2:
+        values[tuple(part)] = scene.reference.values[tuple(part)]
+    curve = trace(
+        replace(scene.frame, values=values), lumen, scene.entry, scene.direction, reference=scene.reference
+    )  # fmt: skip
+    assert (curve.status is FrameStatus.OK) == (seed == 2)
+    assert ("of the lumen's voxels as the reference has them, to the last bit" in curve.note) == (seed != 2)
+
+
 @pytest.mark.parametrize("noises", [-10.0, -0.5, 0.5])
 def test_grey_that_is_counted_from_elsewhere_costs_no_wire(noises):
     """A reference without its intercept, or of a scanner that is not calibrated: half a noise lost every second."""
