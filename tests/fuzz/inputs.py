@@ -245,7 +245,7 @@ def slices(folder: Path, image: Any) -> Path:
     import SimpleITK as sitk
     from pydicom.uid import ExplicitVRLittleEndian
 
-    from tests.studies.format_dicom import one
+    from tests.studies.formats.dicom import one
 
     values, origin, gap = sitk.GetArrayFromImage(image).T, np.array(image.GetOrigin()), image.GetSpacing()[2]
     for k in range(values.shape[2]):

@@ -8,10 +8,15 @@ from typing import Any
 
 import numpy as np
 from pydicom.dataset import Dataset, FileDataset, FileMetaDataset
-from pydicom.uid import ExplicitVRBigEndian, ExplicitVRLittleEndian, ImplicitVRLittleEndian
+from pydicom.uid import ExplicitVRBigEndian, ExplicitVRLittleEndian, ImplicitVRLittleEndian, RLELossless
+
+from tests.pipeline.enhanced_dicom import enhanced
+from tests.studies.formats.base import ORIGIN, SPACING, Variant, numbered
 
 CT, XA = "1.2.840.10008.5.1.4.1.1.2", "1.2.840.10008.5.1.4.1.1.12.1"
+VALUES = numbered()
 Made = tuple[str, Callable[[Path], Any], str, dict[str, Any]]
+"""(name, what writes it, what is wanted, what differs from the scan)."""
 
 
 def one(values: np.ndarray, position: Any, syntax: str, **tags: Any) -> FileDataset:
@@ -36,61 +41,72 @@ def one(values: np.ndarray, position: Any, syntax: str, **tags: Any) -> FileData
     return data
 
 
-def dicom_variants(enhanced: Callable, numbered: np.ndarray, spacing: np.ndarray, origin: np.ndarray) -> Iterator[Made]:
-    """(name, what writes it, what is wanted, what differs from the scan)."""
+def series(
+    name: str = "{k}.dcm",
+    *,
+    place: Callable[[int], Any] = lambda k: ORIGIN + [0, 0, 0.7 * k],
+    of: Callable[[int], dict[str, Any]] = lambda _k: {},
+    values: np.ndarray = VALUES,
+    syntax: str = ExplicitVRLittleEndian,
+    skip: tuple[int, ...] = (),
+    **tags: Any,
+) -> Callable[[Path], Path]:
+    def write(folder: Path) -> Path:
+        for k in range(values.shape[2]):
+            if k not in skip:
+                tags_of = {"InstanceNumber": k + 1} | tags | of(k)
+                one(values[:, :, k], place(k), syntax, **tags_of).save_as(folder / name.format(k=(7 * k) % 11))
+        return folder
 
-    def series(
-        name: str = "{k}.dcm",
-        *,
-        place: Callable[[int], Any] = lambda k: origin + [0, 0, 0.7 * k],
-        of: Callable[[int], dict[str, Any]] = lambda _k: {},
-        values: np.ndarray = numbered,
-        syntax: str = ExplicitVRLittleEndian,
-        skip: tuple[int, ...] = (),
-        **tags: Any,
-    ) -> Callable[[Path], Path]:
-        def write(folder: Path) -> Path:
-            for k in range(values.shape[2]):
-                if k not in skip:
-                    tags_of = {"InstanceNumber": k + 1} | tags | of(k)
-                    one(values[:, :, k], place(k), syntax, **tags_of).save_as(folder / name.format(k=(7 * k) % 11))
-            return folder
+    return write
 
-        return write
 
+def dicom_variants() -> Iterator[Variant]:
+    for make in (of_values, of_places, of_tags, of_whole_files, of_folders):
+        for name, write, want, more in make():
+            yield Variant(name, write, want, **({"direction": np.eye(3)} | more))
+
+
+def of_values() -> Iterator[Made]:
     for syntax in (ImplicitVRLittleEndian, ExplicitVRLittleEndian, ExplicitVRBigEndian):
         yield f"dicom, {syntax.name}", series(syntax=syntax), "right", {}
     yield "dicom, no suffixes", series("IM{k}"), "right", {}
     rescaled = {"RescaleSlope": 2, "RescaleIntercept": -1024}
-    yield "dicom, slope and intercept", series(**rescaled), "right", {"values": 2 * numbered - 1024}
+    yield "dicom, slope and intercept", series(**rescaled), "right", {"values": 2 * VALUES - 1024}
     yield "dicom, a slope of its own a slice", series(of=lambda k: {"RescaleSlope": k + 1, "RescaleIntercept": 0}), \
-        "right", {"values": numbered * (1 + np.arange(9))}  # fmt: skip
+        "right", {"values": VALUES * (1 + np.arange(9))}  # fmt: skip
     yield "dicom, 12 of 16 bits", series(BitsStored=12, HighBit=11, PixelRepresentation=0), "right", {}
-    odd = numbered + 0xF000
+    odd = VALUES + 0xF000
     yield "dicom, overlay in the upper bits", series(values=odd, BitsStored=12, HighBit=11, PixelRepresentation=0), \
         "right", {}  # fmt: skip
     turned = {"PhotometricInterpretation": "MONOCHROME1", "Modality": "XA", "PixelRepresentation": 0}
-    yield "dicom, MONOCHROME1", series(BitsStored=12, HighBit=11, **turned), "MONOCHROME1", {"values": 4095 - numbered}
+    yield "dicom, MONOCHROME1", series(BitsStored=12, HighBit=11, **turned), "MONOCHROME1", {"values": 4095 - VALUES}
     yield "dicom, colours", series(PhotometricInterpretation="RGB"), "!grey values", {}
+
+
+def of_places() -> Iterator[Made]:
     yield "dicom, a slice missing", series(skip=(4,)), "!missing slices", {}
-    yield "dicom, a slice twice", series(place=lambda k: origin + [0, 0, 0.7 * (k - (k == 4))]), "!repeated", {}
-    yield "dicom, tilted", series(place=lambda k: origin + [0, 0.5 * k, 0.7 * k]), "!gantry tilt", {}
-    long = np.repeat(numbered, 15, axis=2)
-    slow = series("{k}.dcm", place=lambda k: origin + [0, 0.03 * k, 0.3 * k], values=numbered)
+    yield "dicom, a slice twice", series(place=lambda k: ORIGIN + [0, 0, 0.7 * (k - (k == 4))]), "!repeated", {}
+    yield "dicom, tilted", series(place=lambda k: ORIGIN + [0, 0.5 * k, 0.7 * k]), "!gantry tilt", {}
+    long = np.repeat(VALUES, 15, axis=2)
+    slow = series("{k}.dcm", place=lambda k: ORIGIN + [0, 0.03 * k, 0.3 * k], values=VALUES)
     yield "dicom, tilted by 5.7 degrees, short", slow, "right", {"spacing": np.array([0.4, 0.5, 0.3])}
 
     def lean(folder: Path) -> Path:
         for k in range(long.shape[2]):
-            place = origin + np.array([0, 0.03 * k, 0.3 * k])
+            place = ORIGIN + np.array([0, 0.03 * k, 0.3 * k])
             one(long[:, :, k], place, ExplicitVRLittleEndian, InstanceNumber=k + 1).save_as(folder / f"{k}.dcm")
         return folder
 
     yield "dicom, tilted by 5.7 degrees, long", lean, "!gantry tilt", {}
-    rounded = series(place=lambda k: origin + [0, 0, round(0.267 * k, 2)])
+    rounded = series(place=lambda k: ORIGIN + [0, 0, round(0.267 * k, 2)])
     yield "dicom, 0.267 mm written with two decimals", rounded, "right", \
         {"spacing": np.array([0.4, 0.5, round(0.267 * 8, 2) / 8])}  # fmt: skip
     jitter = series(of=lambda k: {"ImageOrientationPatient": [1, 2e-5 * (k % 2), 0, -2e-5 * (k % 2), 1, 0]})
     yield "dicom, orientation jitter of 2e-5", jitter, "right", {}
+
+
+def of_tags() -> Iterator[Made]:
     mixed = series(of=lambda k: {"ImageOrientationPatient": [1, 0, 0, 0, 0, 1] if k == 3 else [1, 0, 0, 0, 1, 0]})
     yield "dicom, a scout among the slices", mixed, "!orientation", {}
     other = series(of=lambda k: {"SeriesInstanceUID": f"1.2.{3 + (k > 4)}"})
@@ -105,31 +121,33 @@ def dicom_variants(enhanced: Callable, numbered: np.ndarray, spacing: np.ndarray
     yield "dicom, pixel spacing 0", series(PixelSpacing=[0, 0]), "!spacing", {}
     yield "dicom, pixel spacing -0.4", series(PixelSpacing=[-0.5, -0.4]), "!spacing", {}
     yield "dicom, more rows than pixels", series(Rows=700), "!cut short", {}
-    yield "dicom, one slice", series(values=numbered[:, :, :1]), "!single slice", {}
+    yield "dicom, one slice", series(values=VALUES[:, :, :1]), "!single slice", {}
 
+
+def of_whole_files() -> Iterator[Made]:
     def run(folder: Path) -> Path:
-        whole = one(numbered[:, :, 0], None, ExplicitVRLittleEndian, NumberOfFrames=9, SOPClassUID=XA, Modality="XA")
-        whole.PixelData = np.ascontiguousarray(numbered.T).astype("<i2").tobytes()
+        whole = one(VALUES[:, :, 0], None, ExplicitVRLittleEndian, NumberOfFrames=9, SOPClassUID=XA, Modality="XA")
+        whole.PixelData = np.ascontiguousarray(VALUES.T).astype("<i2").tobytes()
         whole.save_as(folder / "run.dcm")
         return folder / "run.dcm"
 
     yield "dicom, a 2-D rotational run", run, "!projections", {}
 
     def whole(folder: Path) -> Path:
-        places = [tuple(origin + [0, 0, 0.7 * k]) for k in range(9)]
-        (folder / "e.dcm").write_bytes(enhanced(numbered, spacing, places))
+        places = [tuple(ORIGIN + [0, 0, 0.7 * k]) for k in range(9)]
+        (folder / "e.dcm").write_bytes(enhanced(VALUES, SPACING, places))
         return folder / "e.dcm"
 
     yield "dicom, enhanced", whole, "right", {}
     yield "dicom, enhanced, no suffix", lambda f: whole(f).rename(f / "e"), "right", {}
 
-    even = np.pad(numbered, ((0, 3), (0, 1), (0, 0)))  # GDCM refuses planes of an odd number of bytes
+
+def of_folders() -> Iterator[Made]:
+    even = np.pad(VALUES, ((0, 3), (0, 1), (0, 0)))  # GDCM refuses planes of an odd number of bytes
 
     def packed(folder: Path) -> Path:
         for k in range(9):
-            data = one(even[:, :, k], origin + [0, 0, 0.7 * k], ExplicitVRLittleEndian)
-            from pydicom.uid import RLELossless
-
+            data = one(even[:, :, k], ORIGIN + [0, 0, 0.7 * k], ExplicitVRLittleEndian)
             data.compress(RLELossless)
             data.save_as(folder / f"{k}.dcm")
         return folder

@@ -9,20 +9,23 @@ import h5py
 import numpy as np
 
 from pipeline.load import Source
-from tests.studies import formats
+from tests.studies.formats.base import ORIGIN, SHAPE, SPACING, TURN, Variant, by_itk, changed, numbered
+from tests.studies.formats.hdf5 import grouped
+from tests.studies.formats.meta import ascii_mha, big_endian
+from tests.studies.formats.nifti import SLOPE, SROW, nifti
+from tests.studies.formats.nrrd import ascii_nrrd
 
 BITPIX, INTERCEPT = 72, 116
 
 
-def contradictions() -> Iterator[formats.Variant]:
-    Variant, changed, nifti = formats.Variant, formats.changed, formats.nifti
-    mha, nrrd = formats.by_itk("a.mha"), formats.by_itk("a.nrrd")
+def contradictions() -> Iterator[Variant]:
+    mha, nrrd = by_itk("a.mha"), by_itk("a.nrrd")
     for old, new in (("DimSize", "DimSize = 5 7 8"), ("ElementSpacing", "ElementSpacing = 1 1 1")):
         yield Variant(f"mha, two of {old}", changed(mha, ("NDims", f"{new}\nNDims")), f"!{old}")
     yield Variant("mha, one line twice", changed(mha, ("NDims", "NDims = 3\nNDims")))
     for old, new in (("space origin", "space origin: (1,2,3)"), ("type", "type: int")):
         yield Variant(f"nrrd, two of {old}", changed(nrrd, ("dimension", f"{new}\ndimension")), f"!{old}")
-    packed = formats.by_itk("a.mha", compress=True)
+    packed = by_itk("a.mha", compress=True)
     yield Variant("mha, packed to 5 bytes", changed(packed, ("CompressedDataSize =", "5")), "!CompressedDataSize = 5")
     yield Variant(
         "mha, packed to more", changed(packed, ("CompressedDataSize =", "99999")), "!CompressedDataSize = 99999"
@@ -35,15 +38,19 @@ def contradictions() -> Iterator[formats.Variant]:
     skips = changed(nrrd, ("dimension", "byteskip: 3\nbyte skip: 0\ndimension"))
     yield Variant("nrrd, byte skip by two names", skips, "!byte skip: 3 and byte skip: 0")
     for word in ("true", "T", "1"):
-        swapped = changed(formats.big_endian, ("BinaryDataByteOrderMSB = True", f"BinaryDataByteOrderMSB = {word}"))
+        swapped = changed(big_endian, ("BinaryDataByteOrderMSB = True", f"BinaryDataByteOrderMSB = {word}"))
         yield Variant(f"mha, big-endian {word}", swapped)
     for name in ("BinaryData", "CompressedData", "BinaryDataByteOrderMSB"):
         yield Variant(f"mha, {name} perhaps", changed(mha, (f"\n{name} =", "perhaps")), f"!{name} = 'perhaps'")
+    yield from of_voxels()
+
+
+def of_voxels() -> Iterator[Variant]:
     yield Variant("nii, bitpix 8", nifti((BITPIX, "h", 8)), "!bitpix 8")
-    yield Variant("nii, sform nan", nifti((formats.SROW, "f", float("nan"))), "!sform")
+    yield Variant("nii, sform nan", nifti((SROW, "f", float("nan"))), "!sform")
     for slope, shift, want in ((np.inf, 0.0, "!scl_slope inf"), (2.0, np.nan, "!scl_inter nan"), (np.nan, 7.0, "")):
         named = f"nii, slope {slope:g} and intercept {shift:g}"
-        yield Variant(named, nifti((formats.SLOPE, "ff", (slope, shift))), want or "right")
+        yield Variant(named, nifti((SLOPE, "ff", (slope, shift))), want or "right")
     for text, said in (
         ("65541", "of 65541"),
         ("3.5", "of 3.5"),
@@ -51,7 +58,7 @@ def contradictions() -> Iterator[formats.Variant]:
         ("nan", "of nan"),
         ("1_5", "that are no"),
     ):
-        for kind, plain in (("mha", formats.ascii_mha), ("nrrd", formats.ascii_nrrd)):
+        for kind, plain in (("mha", ascii_mha), ("nrrd", ascii_nrrd)):
             yield Variant(f"{kind}, written out with {text}", last_of(plain, text), f"!voxels {said}")
     for name, written in (("slab", np.s_[:8]), ("first chunk", np.s_[:2, :2, :2])):
         yield Variant(f"h5, {name} alone written", part_of_chunks(written), "!its background too")
@@ -59,7 +66,7 @@ def contradictions() -> Iterator[formats.Variant]:
     said = {"plane": "a dataset of the shape (7, 5)", "group": "a group, of volume", "nothing": "an empty dataset"}
     for what, word in {"link": "a link to nothing", **said}.items():
         yield Variant(f"h5, group with a {what}", group_with(what), f"!{word}")
-    yield Variant("h5, group with depths", group_with("depths"), values=formats.numbered() + 2, item=2)
+    yield Variant("h5, group with depths", group_with("depths"), values=numbered() + 2, item=2)
 
 
 def last_of(plain: Callable[[Path], Path], text: str) -> Callable[[Path], Path]:
@@ -78,9 +85,9 @@ def part_of_chunks(written: object) -> Callable[[Path], Source]:
 
     def write(folder: Path) -> Source:
         with h5py.File(folder / "s.h5", "w") as file:
-            data = file.create_dataset("volume", formats.SHAPE[::-1], "i2", chunks=(2, 2, 2), compression="gzip")
-            data[written] = formats.numbered().T[written]
-            data.attrs.update(spacing_mm=formats.SPACING, origin_mm=formats.ORIGIN, direction=formats.TURN)
+            data = file.create_dataset("volume", SHAPE[::-1], "i2", chunks=(2, 2, 2), compression="gzip")
+            data[written] = numbered().T[written]
+            data.attrs.update(spacing_mm=SPACING, origin_mm=ORIGIN, direction=TURN)
         return Source(folder / "s.h5", "/volume")
 
     return write
@@ -89,9 +96,9 @@ def part_of_chunks(written: object) -> Callable[[Path], Source]:
 def part_of_sequence(folder: Path) -> Source:
     """A 4-D dataset whose writer ended before the last volume."""
     with h5py.File(folder / "s.h5", "w") as file:
-        data = file.create_dataset("frames", (3, *formats.SHAPE[::-1]), "i2", chunks=(1, *formats.SHAPE[::-1]))
-        data[:2] = formats.numbered().T
-        data.attrs.update(spacing_mm=formats.SPACING, origin_mm=formats.ORIGIN, direction=formats.TURN)
+        data = file.create_dataset("frames", (3, *SHAPE[::-1]), "i2", chunks=(1, *SHAPE[::-1]))
+        data[:2] = numbered().T
+        data.attrs.update(spacing_mm=SPACING, origin_mm=ORIGIN, direction=TURN)
     return Source(folder / "s.h5", "/frames")
 
 
@@ -99,7 +106,7 @@ def group_with(what: str) -> Callable[[Path], Source]:
     """Volumes, and something beside them."""
 
     def write(folder: Path) -> Source:
-        source = formats.grouped(folder)
+        source = grouped(folder)
         with h5py.File(folder / "s.h5", "a") as file:
             if what == "link":
                 file["frames/3"] = h5py.SoftLink("/nowhere")
