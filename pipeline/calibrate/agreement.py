@@ -1,9 +1,13 @@
 """Do the insertions agree on a roll? One offset for all is no answer to rolls that are stated wrongly for each."""
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.special import chdtrc
 
+from pipeline.calibrate.residuals import Evidence
 from pipeline.calibrate.search import Fit
+from pipeline.calibrate.trials import OWN
 from pipeline.calibrate.unknowns import ROLL
 
 CHANCE = 1e-3
@@ -15,7 +19,8 @@ LINEAR_DEG = 60.0
 
 
 def own_rolls(fit: Fit) -> dict[str, tuple[float, float]]:
-    """By insertion, how far its traces alone would turn the common roll, degrees, and its standard deviation.
+    """By insertion, how far its traces alone would turn the common roll, degrees, and its standard deviation: that of
+    the traces and of how well the roll is stated.
 
     Its clamp and depths follow; the other shared parameters stay. Insertions of a roll of their own are not asked.
     """
@@ -24,7 +29,8 @@ def own_rolls(fit: Fit) -> dict[str, tuple[float, float]]:
     of_each = zip(problem.evidence, problem.parts(), linear.jacobian, linear.residual, strict=True)
     found = {}
     for one, part, jacobian, rest in of_each:
-        own = [i for i in range(part.start, part.stop) if sigmas[i] > 0.0]
+        turn = part.start + OWN - 1
+        own = [i for i in range(part.start, part.stop) if sigmas[i] > 0.0 and i != turn]
         columns = jacobian[:, [k, *own]]
         precision = np.concatenate([[0.0], sigmas[own] ** -2.0])
         normal = columns.T @ columns + np.diag(precision)
@@ -32,8 +38,14 @@ def own_rolls(fit: Fit) -> dict[str, tuple[float, float]]:
             continue
         from_prior = np.concatenate([[0.0], (means - linear.x)[own]])
         wanted = np.linalg.solve(normal, columns.T @ rest + precision * from_prior)
-        found[one.trial.name] = float(wanted[0]), float(np.sqrt(np.linalg.inv(normal)[0, 0]))
+        sd = float(np.hypot(np.sqrt(np.linalg.inv(normal)[0, 0]), sigmas[turn]))
+        found[one.trial.name] = float(wanted[0] + linear.x[turn]), sd
     return found
+
+
+def turned_alone(one: Evidence) -> Evidence:
+    """The insertion with a roll of its own, of which nothing is known."""
+    return replace(one, trial=replace(one.trial, roll_free=True))
 
 
 def no_common_roll(fit: Fit) -> str:

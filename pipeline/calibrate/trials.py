@@ -27,8 +27,9 @@ UNKNOWN_ROLL_DEG = 104.0
 class Trial:
     """An insertion with its traces. vessel : the wall at stiffness 1.     wall : as stated.     given, prior : clamp.
 
-    roll_free : the roll is not stated.     force_N : (frames,) measured push, NaN where it is not; force_sigma_N : its
-    standard deviation.
+    roll_free : the roll is not stated.     roll_sigma_deg : how well it is where it is: an offset that all insertions
+    share is told from what each was turned by mistake.     force_N : (frames,) measured push, NaN where it is not;
+    force_sigma_N : its standard deviation.
     """
 
     name: str
@@ -40,6 +41,7 @@ class Trial:
     seen: tuple[TracedFrame, ...]
     voxel_mm: float
     roll_free: bool = False
+    roll_sigma_deg: float = 0.0
     catheter: OverWire | None = None
     force_N: Array | None = None
     force_sigma_N: float = 1e-3
@@ -48,7 +50,7 @@ class Trial:
     def sigmas(self) -> Array:
         """Prior standard deviations (OWN + frames,) of what belongs to this insertion alone; 0 is exact."""
         tips = np.hypot([np.nan_to_num(f.curve.tip_sigma_mm) for f in self.seen], TIP_VOXELS * self.voxel_mm)
-        roll = UNKNOWN_ROLL_DEG if self.roll_free else 0.0
+        roll = UNKNOWN_ROLL_DEG if self.roll_free else self.roll_sigma_deg
         return np.concatenate([self.prior.sigmas, [LUMEN_VOXELS * self.voxel_mm, roll], tips])
 
 

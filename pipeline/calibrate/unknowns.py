@@ -70,7 +70,7 @@ def unknowns(walls_N_mm2: Sequence[float], friction: float, *, weighed: bool) ->
     """
     found = [
         Unknown(
-            ROLL, 0.0, 100.0, -180.0, 180.0, 1.0, 5.0, "degrees added to the stated roll: the plane of the tip's curve"
+            ROLL, 0.0, 100.0, -180.0, 180.0, 1.0, 8.0, "degrees added to the stated roll: the plane of the tip's curve"
         ),
         _factor(REST, 0.5, MOST_CURVED, 0.02, "factor on the rest curvature"),
         _factor(TAPER, 0.7, 5.0, 0.05, "factor on the shaft's stiffness relative to the tip's"),

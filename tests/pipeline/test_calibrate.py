@@ -101,6 +101,26 @@ def test_rolls_that_are_stated_wrongly_have_no_common_offset(stated_deg, apart):
     assert roll.used == (0.0 if apart else pytest.approx(17.0, abs=1.0))
 
 
+@pytest.mark.parametrize("off_deg", [3.0, 9.0, 20.0])
+def test_rolls_that_are_stated_a_little_wrongly_are_no_taper(off_deg):
+    """Rolls stated 5 to 20 degrees wrong, each otherwise: the taper was 0.76 to 1.5, seen, up to 6.5 sd off."""
+    turns = (off_deg, -off_deg, 0.5 * off_deg)
+    depths = (DEPTHS, (12.0, 18.0, 22.0), (9.0, 14.0, 20.0, 26.0))
+    made = []
+    for n, (turn, at) in enumerate(zip(turns, depths, strict=True)):
+        one = replace(trial(noise=0.01, depths=at), name=str(n), roll_sigma_deg=off_deg)
+        seen = tuple(replace(frame, roll_deg=frame.roll_deg + turn) for frame in one.seen)
+        made.append(Evidence(replace(one, seen=seen)))
+    found = calibrated(all_of(*(one.trial for one in made)), made, SETTINGS)
+    by_name = {e.unknown.name: e for e in found.estimates}
+    for name in (REST, TAPER, FRICTION):
+        assert abs(by_name[name].value - TRUE[name]) < max(2.5 * by_name[name].sd, 1e-3), name
+    if by_name[ROLL].seen:
+        mean = TRUE[ROLL] - np.mean(turns)
+        assert abs(by_name[ROLL].value - mean) < 2.0 * by_name[ROLL].sd
+        assert by_name[ROLL].sd > 0.5 * off_deg / np.sqrt(3.0), "three rolls each known to so much"
+
+
 def test_a_straight_uniform_wire_shows_no_roll_and_no_taper():
     plain = replace(WIRE, bending_stiffness_N_mm2=1.0, rest_curvature_per_mm=0.0)
     one = trial(plain, {FRICTION: 0.0})

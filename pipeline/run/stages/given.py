@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from pipeline.budget.inputs import ROLL_DEG
 from pipeline.calibrate.trials import Trial
 from pipeline.model import Clamp, Curve
 from pipeline.run.stages.known import Context, Frame, Known
@@ -64,6 +65,7 @@ def trial_of(run: Context, known: Known, frames: Sequence[Frame], *, roll_free: 
         seen=tuple(seen_in(trusted)),
         voxel_mm=voxel_mm,
         roll_free=roll_free,
+        roll_sigma_deg=ROLL_DEG if case.roll_sigma_deg is None else case.roll_sigma_deg,
         catheter=case.catheter,
         force_N=force,
         force_sigma_N=case.push_force_sigma_N,
