@@ -53,7 +53,7 @@ def render_calibration(out: Path) -> Path:
         "title": "wireval calibration",
         "used": record["used"],
         "unseen": unseen,
-        "scale": number(record["scale"]),
+        "traces": _of_the_traces(record),
         "gained": gained(record["frames"]),
         "starts": [(number(roll), number(value)) for roll, value in record["starts"]],
         "estimates": grid(table, COLUMNS, bad=[not row["seen"] for row in rows], nothing=NOTHING),
@@ -63,6 +63,19 @@ def render_calibration(out: Path) -> Path:
         "provenance": list(flatten(record["provenance"])),
     }
     return write_page("calibration.html.j2", page, out / "calibration.html")
+
+
+def _of_the_traces(record: Mapping[str, Any]) -> str:
+    """What the traces' standard deviations were taken to be; empty where it is what they state."""
+    scale = float(record["scale"])
+    if record.get("stated", True):
+        times = f"The traces' variances were taken {number(scale)} times as large as they are stated, since the wires "
+        return f"{times}lie that much farther from them. " if f"{scale:.2f}" != "1.00" else ""
+    return (
+        "Curves of your own state no standard deviation: theirs is what the distances that the fit leaves ask for. A "
+        "lumen, or a profile of the wire, that is wrong by as much is not told from noise then, and values may be off "
+        "beyond the standard deviations here: judge by the distances that are left. "
+    )
 
 
 def render_design(out: Path) -> Path:

@@ -156,6 +156,7 @@ def write_record(path: Path, found: Gathered, fit: Calibration) -> None:
         "frames": [vars(frame) for frame in fit.frames],
         "starts": fit.fit.starts,
         "scale": fit.scale,
+        "stated": fit.fit.problem.stated,
         "used": used_by(found),
         "warnings": [*misfit(fit), *flattened(found), *found.left_out],
         "notes": found.notes,

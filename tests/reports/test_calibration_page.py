@@ -1,0 +1,33 @@
+"""What a calibration's page says of the traces that it was fitted to."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from reports.calibration import render_calibration
+from tests.reports import fake_pages
+
+
+@pytest.mark.parametrize(
+    ("stated", "scale", "said", "unsaid"),
+    [
+        (True, 1.0, "", "variances were taken"),
+        (True, 2.5, "taken 2.50 times as large as they are stated", "Curves of your own"),
+        (False, 0.194, "Curves of your own state no standard deviation", "as they are stated"),
+    ],
+)
+def test_variances_are_only_compared_with_those_that_are_stated(
+    tmp_path: Path, stated: bool, scale: float, said: str, unsaid: str
+) -> None:
+    """Of own curves, which state none, "0.194 times as large as they are stated, since the wires lie farther"."""
+    folder = tmp_path / "out"
+    fake_pages._calibration(folder)
+    record = folder / "calibration.json"
+    known = json.loads(record.read_text(encoding="utf-8"))
+    record.write_text(json.dumps(known | {"scale": scale, "stated": stated}), encoding="utf-8")
+    text = render_calibration(folder).read_text(encoding="utf-8")
+    assert said in text
+    assert unsaid not in text
