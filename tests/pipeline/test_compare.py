@@ -300,6 +300,18 @@ def test_one_frame_that_was_made_from_its_trace_is_enough() -> None:
     assert said.startswith("in 4 frames (0, 2, 3, 4) the simulated wires lie within 0.002 mm (rms) of the traced ones")
 
 
+@pytest.mark.parametrize(("off_mm", "said"), [(0.0085, 0), (0.0004, 1)])
+def test_curves_of_another_program_may_lie_near_the_solvers_own_wires(off_mm: float, said: int) -> None:
+    """A rod without segments, given as traces, lay 0.0085 mm off: "made from the traces", and no score. Written to the
+    micrometre, the solver's own are 0.0004 mm off."""
+    frame = Frame(
+        0,
+        curve=Curve(np.zeros((5, 3)), np.full(5, np.nan)),
+        comparison=cast(Any, SimpleNamespace(error_mm=np.full(40, off_mm))),
+    )
+    assert len(_too_near([frame], 0.5, handed=False)) == said
+
+
 def test_the_solvers_own_wire_may_lie_near_a_trace_that_is_little_known() -> None:
     """A soft phantom widens the sigma of its traces: an error of 0.06 mm was that of a wire made from the trace."""
     curve = Curve(np.zeros((5, 3)), np.full(5, 0.34))

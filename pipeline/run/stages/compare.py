@@ -121,8 +121,9 @@ solver's own, in 82 frames of the catalogue and a bend, lies 0.59 of it off."""
 LEAST_MM, APART_MM = 10.0, 1.0
 """Length of such frames from which that is no chance: with 2 mm in each of three frames it is one in 1.5 % of the cases
 of a perfect simulator. Points that are farther apart than a trace's errors reach count as many as they are."""
-NEAREST_MM = 0.01
-"""The same where the curves are the user's own, of unknown standard deviation: no scan shows a wire so well."""
+NEAREST_MM, OWN_NEAREST_MM = 0.01, 0.001
+"""The same where the curves are the user's own, of unknown standard deviation: no scan shows a wire so well. Those of
+another program of the same physics may be as near to the solver's own wires (a rod without segments 0.003 to 0.04)."""
 TRUTH_VOXELS, TRUTH_TIP_VOXELS, TRUTH_TIPS_VOXELS = 0.3, 3.0, 1.5
 """Distance of traced wires from the true ones, median of the frames' means, of the tips in any frame, and in half of
 them, voxels, from which they are not the same wires: traces lie within 0.1 voxel of the true wire, tips within one."""
@@ -191,7 +192,7 @@ def _too_near(frames: Sequence[Frame], sample_mm: float, *, handed: bool) -> lis
 def _nearest_mm(sigma_mm: float, *, handed: bool) -> float:
     """How near a wire may lie to a trace of this standard deviation, NaN where nobody knows it, at the least."""
     if np.isnan(sigma_mm):
-        return NEAREST_MM
+        return NEAREST_MM if handed else OWN_NEAREST_MM
     return NEAREST * sigma_mm if handed else 0.0
 
 
