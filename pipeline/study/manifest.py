@@ -90,6 +90,7 @@ class Case(Strict):
     calibrated: Annotated[str, *FILLED_IN] = ""
     as_stated: Annotated[str, *FILLED_IN] = ""
     own_parameters: Annotated[str, *FILLED_IN] = ""
+    calibrated_kin: Annotated[str, *FILLED_IN] = ""
     calibrated_scans: Annotated[tuple[str, ...], *FILLED_IN] = ()
     calibrated_traces: Annotated[tuple[tuple[Point, ...], ...], *FILLED_IN] = ()
     roll_deg: Finite | PerFrame | Literal["fit"] = 0.0

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
 
 import h5py
 import numpy as np
@@ -28,7 +30,9 @@ from pipeline.budget.shapes import Shapes, energy_score_mm, parted, shapes_of
 from pipeline.budget.surface import offset_field
 from pipeline.budget.verdict import ROUND, axes_across, judged, reach_mm
 from pipeline.cli import main
-from pipeline.model import Array, Clamp, Wire
+from pipeline.model import Array, Clamp, Curve, Wire
+from pipeline.run.stages.budget import Work
+from pipeline.run.stages.known import Frame
 from pipeline.simulate.config import SimulateConfig
 from pipeline.simulate.evidence import TraceSamples
 from pipeline.study.manifest import ManifestError, read_manifest
@@ -290,7 +294,19 @@ def test_every_frame_has_its_uncertainty_beside_its_error(out: Path) -> None:
     assert summary["release_frames"] == errors["release"].notna().sum()
     assert summary["u_val_mm"] > 0.0
     assert 0.0 < summary["ends_rank"] <= 1.0
-    assert "budget rests on 24 insertions" in (case / "result.json").read_text(encoding="utf-8")
+    said = (case / "result.json").read_text(encoding="utf-8")
+    assert "budget rests on 24 insertions" in said
+    assert "the traces, which state none" not in said
+
+
+def test_what_is_assumed_of_traces_that_state_none_is_said() -> None:
+    """It was the largest term, called "its own", and stood among no assumptions."""
+    curves = [Curve(np.zeros((4, 3)), np.full(4, sigma)) for sigma in (0.02, np.nan)]
+    known, unknown = (SimpleNamespace(frames=[Frame(0, curve=curve)], voxel=0.3) for curve in curves)
+    said = Work.trace_said.fget
+    assert said is not None
+    assert said(cast(Any, known)) == ""
+    assert said(cast(Any, unknown)) == "0.045 mm (0.15 voxels, assumed)"
 
 
 def test_the_budget_moves_nothing_and_a_sweep_pays_for_none(out: Path) -> None:

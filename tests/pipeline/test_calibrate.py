@@ -353,6 +353,17 @@ def test_scans_that_were_calibrated_with_are_looked_for_unless_they_are_to_be_sc
     assert not any(case.calibrated_scans or case.calibrated_traces for case in scored)
 
 
+def test_a_part_of_the_calibrated_insertion_is_warned_of(study):
+    """Even frames taught, odd ones were judged: only an assumption said so, which no gate asks for."""
+    cases = read_manifest(study / "manifest.toml").cases
+    (used,) = {one.group for one in read_parameters(study / "p.toml").used}
+    (judged,), _ = as_calibrated([case for case in cases if case.id == "b"], study / "p.toml")
+    assert judged.calibrated_kin == ""
+    kin = [case.model_copy(update={"group": used}) for case in cases if case.id == "b"]
+    (judged,), _ = as_calibrated(kin, study / "p.toml")
+    assert judged.calibrated_kin.startswith(f"its group, {used!r}, is that of a case that was calibrated with")
+
+
 def test_one_frame_in_common_is_enough(study):
     text = (study / "manifest.toml").read_text(encoding="utf-8").replace('traces = ["3.csv"]', 'traces = ["0.csv"]')
     (study / "manifest.toml").write_text(text, encoding="utf-8")

@@ -112,6 +112,14 @@ def test_an_insertion_that_looks_like_the_calibrated_one_scanned_again_is_told()
     assert not rescanned([traced(1.0, seed, 40.0 + seed) for seed in range(3)], learnt)
 
 
+def test_own_curves_of_the_calibrated_insertion_are_told() -> None:
+    """They state no standard deviation: the insertion that had taught the parameters was judged in silence."""
+    learnt = [kept(cast(Curve, traced(1.0, seed, 20.0 + seed).curve)) for seed in range(3)]
+    again = [traced(0.5, 10 + seed, 20.0 + seed, sigma=np.nan) for seed in range(3)]
+    assert "lie where scans that were calibrated with do" in rescanned(again, learnt)[0]
+    assert not rescanned([traced(0.5, seed, 40.0 + seed, sigma=np.nan) for seed in range(3)], learnt)
+
+
 def test_own_curves_are_known_by_their_ends_alone() -> None:
     """Nobody states how well they are known: wires of one depth may be told to a hundredth of a millimetre."""
     own = [traced(0.0, 0, sigma=np.nan), traced(0.0, 1, sigma=np.nan)]

@@ -155,7 +155,15 @@ class Work:
         """What the ensemble was drawn from, for the report."""
         words = ", ".join(f"{name.replace('_', ' ')} {said}" for name, said in self.sigmas.said.items())
         count = self.run.config.budget.members
-        return f"the budget rests on {count} insertions drawn from (one standard deviation): {words}"
+        own = f"; the traces, which state none, are taken to be known to {self.trace_said}" * bool(self.trace_said)
+        return f"the budget rests on {count} insertions drawn from (one standard deviation): {words}{own}"
+
+    @property
+    def trace_said(self) -> str:
+        """What is assumed of traces that state no standard deviation; empty where all do."""
+        curves = [frame.curve for frame in self.frames if frame.curve is not None]
+        known = all(np.isfinite(curve.sigma_mm).all() for curve in curves)
+        return "" if known else f"{UNKNOWN_VOXELS * self.voxel:.2g} mm ({UNKNOWN_VOXELS:g} voxels, assumed)"
 
     def budgets_of(self, ensemble: Sequence[Array]) -> list[Budget | None]:
         """The budget of each frame by an ensemble."""
@@ -191,7 +199,7 @@ class Work:
         ends = (
             ("inputs", "all of these", [b.input_mm for b, _ in pairs]),
             ("segments", "half of num_mm", [np.full(len(b.input_mm), ROUND * self._segments_mm(f)) for b, f in pairs]),
-            ("trace", "its own", [ROUND * self.trace_mm(f) for _, f in pairs]),
+            ("trace", self.trace_said or "its own", [ROUND * self.trace_mm(f) for _, f in pairs]),
             ("u_val", "inputs, segments, trace", [b.whole_mm for b, _ in pairs if b.whole_mm is not None]),
             ("error", "simulated to traced", [f.comparison.error_mm for _, f in pairs if f.comparison is not None]),
         )

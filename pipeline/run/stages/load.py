@@ -23,7 +23,7 @@ def open_case(run: Context, known: Known) -> Known:
     if wrong:
         raise LoadError(f"case {case.id!r}: {wrong[0]}")
     run.log.assumptions += [case.calibrated] * bool(case.calibrated)
-    run.log.warnings += [case.own_parameters] * bool(case.own_parameters)
+    run.log.warnings += [text for text in (case.own_parameters, case.calibrated_kin) if text]
     run.log.warnings += [*implausible([case]), *in_case(case, scans.first)]
     offset, rolls = run.config.simulate.roll_offset_deg, case.stated_roll_deg
     frames = [Frame(i, roll_deg=roll + offset) for i, roll in enumerate(each_frame(rolls, count))]

@@ -26,6 +26,9 @@ two scans cannot be told from one."""
 ONE_WIRE = 3.0
 """The same of two scans of one wire, each with noise of its own: they are traced twice their standard deviation apart
 (1.4 times along each of two axes)."""
+OWN_MM, OWN_TIP_MM = 0.03, 0.06
+"""What traces of the user's own, which state none, are taken to be known to where they are held against others, mm, per
+axis and at the tip: as those of scans with voxels of 0.3 mm."""
 LEAST_AGAIN = 2
 """Frames from which that is no chance: at one depth two insertions may lie alike."""
 MOST_NAMED = 3
@@ -73,7 +76,7 @@ def rescanned(frames: Sequence[Frame], traced_mm: Sequence[ArrayLike]) -> list[s
     traced_mm : points (n, 3) on their traces, as ``kept`` has them. Frames that are traced as one such scan are
     ``repeated`` and not among these.
     """
-    trusted = [frame for frame in frames if frame.trusted_curve is not None]
+    trusted = [_supposed(frame) for frame in frames if frame.trusted_curve is not None]
     learnt = _learnt(traced_mm)
     again = [str(frame.index) for frame in trusted if _alike(frame, learnt, ONE_WIRE)]
     if len(again) < max(LEAST_AGAIN, 0.5 * len(trusted)):
@@ -83,6 +86,14 @@ def rescanned(frames: Sequence[Frame], traced_mm: Sequence[ArrayLike]) -> list[s
         "again: what has taught the parameters is no test of them; take it out, unless the wire was drawn out and "
         "pushed in again between the scans"
     ]
+
+
+def _supposed(frame: Frame) -> Frame:
+    """The frame; a curve of the user's own, which states no standard deviation, with that of a scan's trace."""
+    curve = frame.curve
+    if curve is None or not np.isnan(curve.sigma_mm).all():
+        return frame
+    return replace(frame, curve=replace(curve, sigma_mm=np.full(len(curve.points_mm), OWN_MM), tip_sigma_mm=OWN_TIP_MM))
 
 
 def kept(curve: Curve) -> Array:

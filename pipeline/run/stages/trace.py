@@ -43,7 +43,9 @@ def trace_frames(run: Context, known: Known) -> Known:
         if not given:
             return known
         own = [as_given(run, *pair, known.lumen.distance) for pair in zip(known.frames, given, strict=True)]
-        return _with_room(run, known, _in_step(run, once(own, run.case.calibrated_scans), voxel_mm))
+        run.log.warnings += rescanned(own, run.case.calibrated_traces)
+        single = once(own, run.case.calibrated_scans, run.case.calibrated_traces)
+        return _with_room(run, known, _in_step(run, single, voxel_mm))
     work = _Tracing(run, known, given)
     parts = run.share("trace", work.part, len(known.frames), work.meanwhile)
     for part in parts:
