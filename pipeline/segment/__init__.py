@@ -139,13 +139,7 @@ def segment(
         thin = balls(grid, region.thin, site.corner, region.levels, blur)
         add_balls(wall.values, np.asarray(grid.spacing_mm), thin, config.outer_mm)
     other = brighter(wall.levels, wire_radius_mm is not None) + bright + uneven.warning(found.least)
-    said: tuple[str, ...] = () if found.layer is None else (surrounded(found.layer, float(np.mean(grid.spacing_mm))),)
-    said += (
-        cut_off(scan, found.distance, site.corner)
-        + flat_side(found.distance)
-        + warning(open_ones)
-        + valley.warning(grid, region.passing)
-    )
+    said = _of_the_vessel(scan, found) + warning(open_ones) + valley.warning(grid, region.passing)
     said += other or bone.two_greys(grid, found.distance, site.corner, wall.levels, wall.blur_mm)
     box = wall.values, site.corner
     said += add_necks(region.necks, box, grid, region.levels, blur)

@@ -147,17 +147,15 @@ def with_parameters(case: "Case", found: Parameters, data: Sequence[str], *, sco
         changes["roll_deg"] = turned if isinstance(case.roll_deg, tuple) else turned[0]
     if case.insertion_mm is not None:
         changes["insertion_mm"] = tuple(max(mm + found.depth_offset_mm, 1e-3) for mm in case.insertion_mm)
-    if any(case.group == used.group for used in found.used):
-        what = f"its group, {case.group!r}, is that of a case that was calibrated with"
-        changes["calibrated_kin"] = (
-            f"{what}: as a part of one insertion it is no test of the parameters; "
-            "if it is another insertion, give it a group of its own"
-        )
     own = sharing(found, data)
     if own:
         warning = f"its scans or traces were calibrated with (as case {own!r}): its errors say nothing about the model"
         changes |= {"role": "calibration", "own_parameters": warning, "calibrated_scans": (), "calibrated_traces": ()}
-        changes["calibrated_kin"] = ""
+    elif any(case.group == used.group for used in found.used):
+        changes["calibrated_kin"] = (
+            f"its group, {case.group!r}, is that of a case that was calibrated with: as a part of one insertion it is "
+            "no test of the parameters; if it is another insertion, give it a group of its own"
+        )
     return case.model_copy(update=changes)
 
 

@@ -185,8 +185,8 @@ def subtracted(frame: Volume, lumen: Lumen, reference: Volume | None) -> Subtrac
     counters = {"voxels_total": total, "voxels_read": read, "voxels_skipped": total - read}
     blur = wall_blur(lumen, float(np.min(region.box.spacing_mm)))
     modelled, levels = reference is None or gain != 1.0, {"noise": noise, "gain": gain}
-    if still is not None:
-        levels["copied"] = copied_share(grid.values[tuple((region.sample + region.corner).T)], still)
+    if still is not None and (copied := copied_share(grid.values[tuple((region.sample + region.corner).T)], still)):
+        levels["copied"] = copied
     uneven = modelled and lumen.levels.get("least_filling", 1.0) < UNEVEN
     return Subtraction(region, grey, max(noise, 1e-6), modelled, blur, grid, uneven, counters, levels)
 
