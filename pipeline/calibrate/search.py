@@ -128,7 +128,8 @@ def _starts(problem: Problem) -> list[Array]:
     free = np.array([one.trial.roll_free for one in problem.evidence])
     together = each[:, ~free].sum(axis=1)
     chosen = []
-    for k in _valleys(together):
+    valleys = _valleys(together)
+    for k in valleys[:1] if free.all() else valleys:  # no insertion asks for a common roll: all starts would be one
         x = xs[k].copy()
         for i, part in enumerate(problem.parts()):
             if free[i]:
