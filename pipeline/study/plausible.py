@@ -44,7 +44,7 @@ def leads_out(case: Case, header: Header | None) -> list[str]:
     ]
 
 
-SHALLOWEST_MM, LONGEST_WAY = 1.0, 5.0
+SHALLOWEST_MM, LONGEST_WAY = 1.0, 3.0
 """Least depth that an insertion reaches, and most times that a vessel's way may be as long as its scan's diagonal."""
 
 
@@ -79,7 +79,7 @@ def _of_no_wire(depths: Sequence[float], header: Header | None) -> list[str]:
     if SHALLOWEST_MM <= deepest <= LONGEST_WAY * diagonal:
         return []
     than = f"and the scan is {diagonal:.0f} mm across" if deepest > SHALLOWEST_MM else "no wire is seen to move by that"
-    return [f"insertion_mm goes to {deepest:g} mm, {than}: is it in another unit than mm?"]
+    return [f"insertion_mm goes to {deepest:g} mm, {than}: is it in another unit than mm, or the scan's header?"]
 
 
 TRUTH_OFF_MM, TRUTH_OFF = 5.0, 0.25

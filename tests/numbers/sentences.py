@@ -23,6 +23,7 @@ from tests.numbers.drawn import said
 from tests.numbers.kept import Numbers, Scene, digest
 
 NAN, INF = float("nan"), float("inf")
+ORIGIN = [0.0, 0.0, 0.0]
 COUNT = 300
 MANIFEST = """
 schema = 1
@@ -170,7 +171,10 @@ def lengths() -> Numbers:
         rough.append(bend * np.column_stack([np.cos(turns), np.sin(turns), 0.1 * turns]))
     return together(
         in_step=("".join(f"{f.status} {f.message} " for f in depths.in_step(frames, 0.3)) for frames in found),
-        elsewhere=(" ".join(depths.stated_elsewhere(frames, 2.0)) for frames in found),
+        elsewhere=(
+            " ".join(depths.stated_elsewhere(frames, depths.traced_depths(frames, ORIGIN, [0.0, 0.6, 0.8]), 2.0))
+            for frames in found
+        ),
         shrinking=(" ".join(depths.shrinking(frames, 0.3)) for frames in found),
         standing=(" ".join(depths.standing(frames, 0.3)) for frames in found),
         rough=(" ".join(own_curves.rough({3: curve}, 0.3, "the traces", "export more")) for curve in rough),

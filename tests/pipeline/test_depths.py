@@ -9,7 +9,16 @@ import pytest
 
 from pipeline.model import Curve
 from pipeline.run.log import Log
-from pipeline.run.stages.depths import in_step, shrinking, standing, stated_elsewhere, turned_round
+from pipeline.run.stages.depths import (
+    in_another_order,
+    in_step,
+    shrinking,
+    standing,
+    stated_elsewhere,
+    to_depth,
+    traced_depths,
+    turned_round,
+)
 from pipeline.run.stages.dim_ends import faint_ends, own_dim_ends
 from pipeline.run.stages.known import Frame
 from pipeline.run.stages.repeated import once
@@ -31,6 +40,16 @@ def frames(lengths: list[float], expected: list[float]) -> list[Frame]:
 DEPTHS = [10.0, 14.0, 18.0, 22.0, 26.0, 30.0]
 
 
+def from_entry(seen: list[Frame], z_mm: float = 0.0) -> dict[int, float]:
+    """Their depths from an entry at this height, where their curves begin at 0."""
+    return traced_depths(seen, [0.0, 0.0, z_mm], [0.0, 0.0, 1.0])
+
+
+def elsewhere(lengths: list[float], expected: list[float], z_mm: float = 0.0) -> list[str]:
+    seen = frames(lengths, expected)
+    return stated_elsewhere(seen, from_entry(seen, z_mm), 2.0)
+
+
 @pytest.mark.parametrize("cut", [0, 3, 5])
 def test_a_wire_cut_short_by_less_than_the_tolerance_is_out_of_step(cut: int) -> None:
     lengths = [d - 0.4 for d in DEPTHS]
@@ -49,11 +68,48 @@ def test_a_scale_that_is_off_or_read_by_hand_is_no_fault() -> None:
 
 def test_depths_counted_from_elsewhere_are_a_warning() -> None:
     """1.5 mm in every frame, within the tolerance of each: 16 of 18 ok, and nothing was said."""
-    (said,) = stated_elsewhere(frames([d - 1.5 for d in DEPTHS], DEPTHS), 2.0)
+    (said,) = elsewhere([d - 1.5 for d in DEPTHS], DEPTHS)
     assert said.startswith("the traced wires are 1.5 mm shorter than insertion_mm states (median of 6 frames)")
-    assert stated_elsewhere(frames([d - 0.4 for d in DEPTHS], DEPTHS), 2.0) == []
-    assert stated_elsewhere(frames([d - 1.5 for d in DEPTHS[:3]], DEPTHS[:3]), 2.0) == []
-    assert stated_elsewhere(frames(DEPTHS, [float("nan")] * 6), 2.0) == []
+    assert elsewhere([d - 0.4 for d in DEPTHS], DEPTHS) == []
+    assert elsewhere([d - 1.5 for d in DEPTHS[:3]], DEPTHS[:3]) == []
+    assert elsewhere(DEPTHS, [float("nan")] * 6) == []
+
+
+def test_depths_that_are_refused_count_among_those_counted_from_elsewhere() -> None:
+    """2 mm in each of five frames: two were refused, alone, and three were too few to be told of."""
+    seen = frames([d - 1.9 for d in DEPTHS[:5]], DEPTHS[:5])
+    seen = [f.failed("trace", FrameStatus.LENGTH_MISMATCH, "by itself") if f.index < 2 else f for f in seen]
+    (said,) = stated_elsewhere(seen, from_entry(seen), 2.0)
+    assert said.startswith("the traced wires are 1.9 mm shorter than insertion_mm states (median of 5 frames)")
+
+
+def test_an_entry_before_the_wire_begins_counts_as_depth() -> None:
+    """1.5 mm back the wires were as long as stated, and 1.0 to 1.6 mm deeper, without a word; 3 mm back one was ok."""
+    (said,) = elsewhere(DEPTHS, DEPTHS, -1.5)
+    assert said.startswith(
+        "the traced wires are 1.5 mm longer than insertion_mm states and begin 1.5 mm beyond entry_mm"
+    )
+    assert elsewhere([d - 1.5 for d in DEPTHS], DEPTHS, -1.5) == []
+    seen = frames(DEPTHS, DEPTHS)
+    assert all(f.ok for f in to_depth(seen, from_entry(seen, -1.5), 2.0))
+    first, *_ = to_depth(seen, from_entry(seen, -2.6), 2.0)
+    assert first.status == "length_mismatch"
+    assert "got 12.60 mm from entry_mm to the tip, as the traced wire begins 2.60 mm beyond it" in first.message
+
+
+def test_frames_in_another_order_are_named_as_such() -> None:
+    """Four of five failed by their lengths, with advice to turn entry_direction round."""
+    seen = frames(DEPTHS[:5][::-1], DEPTHS[:5])
+    (said,) = in_another_order(seen, from_entry(seen), 2.0)
+    assert said.startswith(
+        "the traced wires have the depths that insertion_mm states, of other frames (4 of 5): that of"
+    )
+    assert "frame 0, 26.0 mm, is of frame 4; are frames and insertion_mm in one order?" in said
+    for lengths in (DEPTHS[:5], [10.0, 14.0, 12.0, 22.0, 26.0], [d + 3.0 for d in DEPTHS[:5]]):
+        other = frames(lengths, DEPTHS[:5])
+        assert not in_another_order(other, from_entry(other), 2.0)
+    unknown = frames(DEPTHS[:2], [float("nan")] * 2)
+    assert not in_another_order(unknown, from_entry(unknown), 2.0)
 
 
 def test_too_few_frames_or_no_depths_say_nothing() -> None:
@@ -73,7 +129,7 @@ def test_a_wire_that_does_not_advance_is_a_warning() -> None:
 
 def test_a_wire_that_gets_shorter_unsaid_is_a_warning() -> None:
     nan = [float("nan")] * 3
-    assert "frames 2 (-3.0 mm)" in shrinking(frames([10.0, 14.0, 11.0], nan), 0.3)[0]
+    assert "frame 2 (-3.0 mm): the traced wire is shorter" in shrinking(frames([10.0, 14.0, 11.0], nan), 0.3)[0]
     assert shrinking(frames([10.0, 14.0, 13.9], nan), 0.3) == []
     assert shrinking(frames([10.0, 14.0, 11.0], [10.0, 14.0, 11.0]), 0.3) == []
 

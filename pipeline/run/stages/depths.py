@@ -3,14 +3,16 @@
 Stated depths are off by the errors of the hand's scale and of the entry, which neighbouring frames share.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from pipeline.arrays.grids import spread
-from pipeline.model import Array
+from pipeline.model import Array, Clamp
 from pipeline.run.stages.known import Frame
+from pipeline.simulate.clamp import depth_from
 from pipeline.status import FrameStatus
 
 AROUND = 5
@@ -55,20 +57,68 @@ def in_common(apart: Array, least: float) -> float:
     return usual if abs(usual) > least and np.mean(apart * usual > 0) >= ALIKE else 0.0
 
 
-def stated_elsewhere(frames: Sequence[Frame], tolerance_mm: float) -> list[str]:
-    """A warning where all traces are about as much shorter, or longer, than insertion_mm states.
-
-    tolerance_mm : by how much a frame alone may be.
+def traced_depths(frames: Sequence[Frame], entry_mm: ArrayLike, direction: ArrayLike) -> dict[int, float]:
+    """By number, how deep the traced wire is where its depth is stated, mm from the plane of entry: its length, and how
+    far beyond that plane it begins. With those that are refused for their length alone.
     """
-    apart = [c.length_mm - f.expected_mm for f in frames if (c := f.trusted_curve) is not None]
-    known = np.array([mm for mm in apart if np.isfinite(mm)])
+    clamp = Clamp(np.asarray(entry_mm, float), np.asarray(direction, float), None)
+    wrong = FrameStatus.LENGTH_MISMATCH.identifier
+    seen = [f for f in frames if f.curve is not None and f.traced and (f.trusted_curve or f.status == wrong)]
+    return {f.index: depth_from(clamp, f.curve) for f in seen if f.curve is not None and np.isfinite(f.expected_mm)}
+
+
+def to_depth(frames: Sequence[Frame], depths_mm: Mapping[int, float], tolerance_mm: float) -> list[Frame]:
+    """The frames; one that is deeper than stated, since its trace begins beyond the entry, is not to be trusted."""
+    out = list(frames)
+    for n, f in enumerate(frames):
+        off = depths_mm.get(f.index, f.expected_mm) - f.expected_mm
+        if f.trusted_curve is not None and abs(off) > tolerance_mm:
+            note = (
+                f"trace: depth: got {f.expected_mm + off:.2f} mm from entry_mm to the tip, as the traced wire begins "
+                f"{off + f.expected_mm - f.trusted_curve.length_mm:.2f} mm beyond it; expected {f.expected_mm:.2f} mm "
+                f"(insertion_mm) to within {tolerance_mm} mm; move entry_mm to where the wire enters, or look whether "
+                "it is hidden there"
+            )
+            out[n] = f.failed("trace", FrameStatus.LENGTH_MISMATCH, note)
+    return out
+
+
+def stated_elsewhere(frames: Sequence[Frame], depths_mm: Mapping[int, float], tolerance_mm: float) -> list[str]:
+    """A warning where all wires are about as much shallower, or deeper, than insertion_mm states.
+
+    depths_mm : of ``traced_depths``.     tolerance_mm : by how much a frame alone may be.
+    """
+    stated = {f.index: f.expected_mm for f in frames}
+    lengths = {f.index: f.curve.length_mm for f in frames if f.curve is not None}
+    known = np.array([mm - stated[n] for n, mm in depths_mm.items()])
     usual = in_common(known, 0.5 * tolerance_mm) if len(known) >= FEWEST else 0.0
     if not usual:
         return []
+    late = float(np.median([mm - lengths[n] for n, mm in depths_mm.items()]))
+    begins = f" and begin {late:.1f} mm beyond entry_mm" if late > 0.5 * tolerance_mm else ""
     return [
-        f"the traced wires are {abs(usual):.1f} mm {'longer' if usual > 0 else 'shorter'} than insertion_mm states "
-        f"(median of {len(known)} frames): check from where depths were counted, and entry_mm; the simulated wires "
-        "go as deep as the traced ones, unless simulate.depth is manifest"
+        f"the traced wires are {abs(usual):.1f} mm {'longer' if usual > 0 else 'shorter'} than insertion_mm states"
+        f"{begins} (median of {len(known)} frames): check from where depths were counted, and entry_mm; the simulated "
+        "wires go as deep as the traced ones, unless simulate.depth is manifest"
+    ]
+
+
+def in_another_order(frames: Sequence[Frame], depths_mm: Mapping[int, float], tolerance_mm: float) -> list[str]:
+    """A warning where the wires have the stated depths, but those of other frames. depths_mm : of ``traced_depths``."""
+    numbers = [*depths_mm]
+    stated = np.array([f.expected_mm for f in frames if f.index in depths_mm])
+    traced = np.array([depths_mm[n] for n in numbers])
+    place = np.argsort(np.argsort(traced, kind="stable"), kind="stable")
+    whose = np.argsort(stated, kind="stable")[place]
+    apart = np.abs(traced - stated)
+    if not np.any(apart > tolerance_mm) or np.any(np.abs(traced - stated[whose]) > tolerance_mm):
+        return []
+    worst = int(np.argmax(apart))
+    count = np.count_nonzero(apart > tolerance_mm)
+    return [
+        f"the traced wires have the depths that insertion_mm states, of other frames ({count} of {len(numbers)}): that "
+        f"of frame {numbers[worst]}, {traced[worst]:.1f} mm, is of frame {numbers[int(whose[worst])]}; are frames and "
+        "insertion_mm in one order?"
     ]
 
 
@@ -99,8 +149,9 @@ def shrinking(frames: Sequence[Frame], voxel_mm: float) -> list[str]:
     if not odd:
         return []
     return [
-        f"frames {', '.join(odd)}: the traced wire is shorter than in the frame before, allowed where it was pulled "
-        "back; look at the picture whether the trace is cut short, or state insertion_mm"
+        f"frame{'s' * (len(odd) > 1)} {', '.join(odd)}: the traced wire is shorter than in the frame before, allowed "
+        "where it was pulled back; are the frames in order? Else look at the picture whether the trace is cut short, "
+        "or state insertion_mm"
     ]
 
 

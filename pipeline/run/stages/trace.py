@@ -17,7 +17,16 @@ from pipeline.run.log import Log
 from pipeline.run.projections import grey_window, projections
 from pipeline.run.stages.before import NOTHING, Before
 from pipeline.run.stages.beside import beside_what_is_seen
-from pipeline.run.stages.depths import in_step, shrinking, standing, stated_elsewhere, turned_round
+from pipeline.run.stages.depths import (
+    in_another_order,
+    in_step,
+    shrinking,
+    standing,
+    stated_elsewhere,
+    to_depth,
+    traced_depths,
+    turned_round,
+)
 from pipeline.run.stages.dim_ends import faint_ends, own_dim_ends
 from pipeline.run.stages.gaps import own_gaps
 from pipeline.run.stages.known import Context, Frame, Known
@@ -71,9 +80,12 @@ def trace_frames(run: Context, known: Known) -> Known:
 
 def _in_step(run: Context, frames: list[Frame], voxel_mm: float) -> list[Frame]:
     """The frames, those out of step not to be trusted; warnings of what lengths and own curves tell of themselves."""
-    frames = in_step(frames, voxel_mm)
+    tolerance_mm = run.config.trace.length_tolerance_mm
+    depths_mm = traced_depths(frames, run.case.entry_mm, run.case.entry_direction)
+    run.log.warnings += in_another_order(frames, depths_mm, tolerance_mm)
+    run.log.warnings += stated_elsewhere(frames, depths_mm, tolerance_mm)
+    frames = in_step(to_depth(frames, depths_mm, tolerance_mm), voxel_mm)
     run.log.warnings += [*shrinking(frames, voxel_mm), *standing(frames, voxel_mm)]
-    run.log.warnings += stated_elsewhere(frames, run.config.trace.length_tolerance_mm)
     if run.case.traces:
         own = {f.index: curve.points_mm for f in frames if (curve := f.trusted_curve) is not None}
         run.log.warnings += rough(own, voxel_mm, "the manifest's own curves", RESAMPLE)
