@@ -22,21 +22,24 @@ Told = dict[str, str]
 def what_differs(before: Path, after: Path) -> list[dict[str, str]]:
     """Rows (what, before, after) of everything that is not the same in two output folders."""
     old, new = results_in(before), results_in(after)
-    told = [(whole | _cases(found), _inputs(found, old.keys() & new.keys()))
-            for whole, found in ((_whole(before, old), old), (_whole(after, new), new))]  # fmt: skip
-    (first, files), (second, others) = told
+    both = old.keys() & new.keys()
+    first, second = _whole(before, old) | _cases(old), _whole(after, new) | _cases(new)
+    before_said, after_said = _stated(old, both), _stated(new, both)
+    of_cases = [(_inputs(old, both), _inputs(new, both), "input"),
+                (_known_to(before_said, after_said), _known_to(after_said, before_said), "manifest")]  # fmt: skip
     silent = [told.keys() <= {"cases"} for told in (first, second)]
     if any(silent):  # golden tables say nothing of where they come from
-        files, others = {}, {}
+        of_cases = []
         what = "settings, code and inputs"
         first, second = ({"cases": told["cases"], what: UNTOLD if mute else TOLD}
                          for told, mute in zip((first, second), silent, strict=True))  # fmt: skip
     rows = [(name, first.get(name, ABSENT), second.get(name, ABSENT)) for name in dict.fromkeys([*first, *second])]
-    same: dict[tuple[str, str, str], list[str]] = {}
-    for case, key in dict.fromkeys([*files, *others]):
-        change = key, files.get((case, key), ABSENT), others.get((case, key), ABSENT)
-        same.setdefault(change, []).append(case)
-    rows += [(f"input of {listed(cases)}: {key}", a, b) for (key, a, b), cases in same.items()]
+    for files, others, what in of_cases:
+        same: dict[tuple[str, str, str], list[str]] = {}
+        for case, key in dict.fromkeys([*files, *others]):
+            change = key, files.get((case, key), ABSENT), others.get((case, key), ABSENT)
+            same.setdefault(change, []).append(case)
+        rows += [(f"{what} of {listed(cases)}: {key}", a, b) for (key, a, b), cases in same.items()]
     return [{"what": name, "before": a, "after": b} for name, a, b in rows if a != b]
 
 
@@ -153,6 +156,29 @@ def _code(result: Mapping[str, Any]) -> Told:
 
 def _cases(found: Iterable[str]) -> Told:
     return {"cases": ", ".join(sorted(found))}
+
+
+STATED, AT_CHOICE = ("wire", "wall", "entry"), ("down", "catheter")
+"""Parts of result.json that say what the manifest, with calibrated parameters where there are any, states of a case; and
+those that are left out where it states none.
+"""
+FOUND = "used_", "sigma_", "covariance"
+"""How keys begin in them of what was found."""
+
+
+def _stated(found: Mapping[str, Mapping[str, Any]], cases: Iterable[str]) -> dict[tuple[str, str], str]:
+    """What the manifest states, by case and table.key. Results of an earlier version do not say all of it."""
+    said: dict[tuple[str, str], str] = {}
+    for case in sorted(cases):
+        values = {f"{table}.{key}": v for table in STATED for key, v in found[case].get(table, {}).items()}
+        values = {name: v for name, v in values.items() if not name.partition(".")[2].startswith(FOUND)}
+        values |= {name: found[case].get(name) for name in AT_CHOICE}
+        said |= {(case, name): ABSENT if value is None else str(value) for name, value in values.items()}
+    return said
+
+
+def _known_to(said: Mapping[tuple[str, str], str], other: Mapping[tuple[str, str], str]) -> dict[tuple[str, str], str]:
+    return {key: value for key, value in said.items() if key in other}
 
 
 def _inputs(found: Mapping[str, Mapping[str, Any]], cases: Iterable[str]) -> dict[tuple[str, str], str]:

@@ -224,7 +224,8 @@ def lost(
 
 def details_of(case: Case, known: Known, log: Log) -> dict[str, Any]:
     """What the pages show beside the tables."""
-    clamp: dict[str, Any] = {"entry_mm": case.entry_mm, "entry_direction": case.entry_direction}
+    stated = "entry_mm", "entry_direction", "material_axis", "roll_deg", "insertion_mm"
+    clamp: dict[str, Any] = {name: getattr(case, name) for name in stated}
     if known.clamp is not None:
         clamp |= {"used_mm": known.clamp.entry_mm, "used_direction": known.clamp.direction}
         clamp |= {"sigma_mm": known.clamp.sigma_mm, "sigma_deg": known.clamp.sigma_deg}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 import xml.etree.ElementTree as ET
 from dataclasses import replace
@@ -100,6 +101,26 @@ def test_what_differs_is_said_first(first: Path, second: Path, capsys: pytest.Ca
     assert "othing differs" not in said
     for what in (f"{table}.{key}", "0123abc", "input of a: frames[4]", "input of b, c: frames[0]"):
         assert what in said
+
+
+def test_what_the_manifests_state_otherwise_is_said(
+    first: Path, second: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Of a radius twice as large a reviewer saw two hashes of the manifest."""
+    for out, radius_mm in ((first, 0.18), (second, 0.36)):
+        for name in GROUPS:
+            path = out / "cases" / name / "result.json"
+            stated = {
+                "wire": {"radius_mm": radius_mm, "name": "w"},
+                "entry": {"entry_mm": [0, 0, 1], "used_mm": radius_mm},
+            }
+            stated |= {"down": [0, 1, 0]} if out == second else {}
+            path.write_text(json.dumps(json.loads(path.read_text(encoding="utf-8")) | stated), encoding="utf-8")
+    main(["diff", str(first), str(second)])
+    said = capsys.readouterr().out
+    assert re.search(r"manifest of a, b, c: wire.radius_mm +0.18 +0.36", said)
+    assert re.search(r"manifest of a, b, c: down +\(none\) +\[0, 1, 0\]", said)
+    assert said.count("manifest of") == 2, "neither what was found, nor what an earlier version does not say"
 
 
 def test_the_verdict_follows_what_differs_and_ends_the_text(
