@@ -159,9 +159,8 @@ def _cases(found: Iterable[str]) -> Told:
 
 
 STATED, AT_CHOICE = ("wire", "wall", "entry"), ("down", "catheter")
-"""Parts of result.json that say what the manifest, with calibrated parameters where there are any, states of a case; and
-those that are left out where it states none.
-"""
+"""Parts of result.json that say what the manifest states of a case, with calibrated parameters where there are any; and
+those that are left out where it states none."""
 FOUND = "used_", "sigma_", "covariance"
 """How keys begin in them of what was found."""
 

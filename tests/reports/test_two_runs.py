@@ -114,7 +114,7 @@ def test_what_the_manifests_state_otherwise_is_said(
                 "wire": {"radius_mm": radius_mm, "name": "w"},
                 "entry": {"entry_mm": [0, 0, 1], "used_mm": radius_mm},
             }
-            stated |= {"down": [0, 1, 0]} if out == second else {}
+            stated |= {"down": None if out == first else [0, 1, 0]}
             path.write_text(json.dumps(json.loads(path.read_text(encoding="utf-8")) | stated), encoding="utf-8")
     main(["diff", str(first), str(second)])
     said = capsys.readouterr().out
