@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from pipeline.model import OverWire, Wire
+from pipeline.model import OverWire, Wall, Wire
 from pipeline.study.manifest import Case
 
 RADII_MM = (0.1, 0.5)
@@ -21,6 +21,8 @@ SHARPEST = 0.5
 LEAST_TWIST, MOST_TWIST, ROD_TWIST = 0.01, 3.0, 0.77
 """Torsional stiffness over that of the stiffest bend, guide wires' and a round rod's, which is 1 / (1 + Poisson's ratio
 of 0.3): a coil about a core bends stiffly for its twist or twists stiffly for its bend; a unit is 1000 or more off."""
+MOST_TURNED_DEG = 450.0
+"""A pigtail turns by a whole turn and somewhat more; a curve per cm in place of one per mm turned a tip by 550."""
 STIFFER_TIP = 1.5
 """How much stiffer than its far end the tip is at least where it is doubted."""
 
@@ -57,6 +59,12 @@ def _oddities(wire: Wire) -> Iterator[str]:
             f"rest_curvature_per_mm of {sharpest:.3g} at the most: a bend of {1.0 / sharpest:.2g} mm radius in a wire "
             f"of radius_mm = {radius:g}; is it a radius (mm), or per metre?"
         )
+    turned = _turned_deg(wire)
+    if turned > MOST_TURNED_DEG:
+        yield (
+            f"rest_curvature_per_mm turns the wire by {turned:.0f} degrees in all: pigtails turn by 360 or so, and "
+            "what turns more lies in itself; is it per cm, or the length of the curve wrong?"
+        )
     heaviest = HEAVIEST_N_MM3 * np.pi * radius**2
     if wire.weight_N_per_mm > heaviest:
         yield (
@@ -69,6 +77,30 @@ def _oddities(wire: Wire) -> Iterator[str]:
             "the tip; profiles count from the tip, is it turned round?"
         )
     yield from _of_twist(wire.torsional_stiffness_N_mm2, most)
+
+
+def _turned_deg(wire: Wire) -> float:
+    """By how much the rest curve turns from the tip to where its profile ends, degrees; 0 of a wire that is alike all
+    along, whose length nobody states."""
+    profile = np.atleast_2d(wire.rest_curvature_per_mm)
+    if profile.shape[1] < 2:
+        return 0.0
+    return float(np.degrees(np.trapezoid(np.abs(profile[:, 1]), profile[:, 0])))
+
+
+WALLS_N_MM2 = (0.005, 1000.0)
+"""Stiffness per mm of wire of a vessel's wall: the softest tube here has 0.03 N/mm2, a sheath of plastic 100."""
+
+
+def odd_wall(wall: Wall) -> list[str]:
+    """A sentence where a wall is stiffer or softer than any."""
+    least, most = WALLS_N_MM2
+    if least <= wall.stiffness_N_mm2 <= most:
+        return []
+    return [
+        f"wall stiffness_N_mm2 = {wall.stiffness_N_mm2:g}: force per mm of wire and mm of depth; vessels and phantoms "
+        f"have {least:g} to {most:g}; is it a modulus, or in another unit?"
+    ]
 
 
 def _of_twist(twist: float, bend: float) -> Iterator[str]:

@@ -9,7 +9,7 @@ from pipeline.load import Header, read_header
 from pipeline.load.curves import read_truth
 from pipeline.model import Array, arc_length
 from pipeline.simulate.others import oddity
-from pipeline.study.devices import implausible, odd_catheter
+from pipeline.study.devices import implausible, odd_catheter, odd_wall
 from pipeline.study.manifest import Case
 from pipeline.study.same_scans import continued, shared
 from pipeline.study.settings import Config
@@ -143,6 +143,20 @@ def other_voxels(header: Header | None) -> list[str]:
     return [f"spacing_mm: {note}; is that meant?" for note in notes if "where the file has" in note]
 
 
+def lost_header(header: Header | None) -> list[str]:
+    """A sentence where a scan has voxels of just 1 mm from 0, 0, 0 along the axes: as where its header was lost."""
+    if header is None:
+        return []
+    grid = header.grid
+    plain = np.all(grid.spacing_mm == 1.0) and np.all(grid.origin_mm == 0.0)
+    if not plain or not np.all(np.isin(np.abs(grid.direction), (0.0, 1.0))):
+        return []
+    return [
+        "the scan has voxels of 1 mm from 0, 0, 0 along the axes, as where a program that knows of no header wrote it: "
+        "are they? Else export it anew, or give spacing_mm"
+    ]
+
+
 THINNEST_VOXELS = 0.5
 
 
@@ -165,8 +179,8 @@ def too_thin(case: Case, header: Header | None) -> list[str]:
 
 def in_case(case: Case, scan: Header | None) -> list[str]:
     """What is doubtful in a case beside its wire and its truth. scan : header of a scan of the case."""
-    of_scan = [*other_voxels(scan), *leads_out(case, scan), *odd_depths(case, scan)]
-    return [*of_scan, *wrapped_rolls(case), *odd_catheter(case.catheter), *too_thin(case, scan)]
+    of_scan = [*other_voxels(scan), *lost_header(scan), *leads_out(case, scan), *odd_depths(case, scan)]
+    return [*of_scan, *wrapped_rolls(case), *odd_wall(case.wall), *odd_catheter(case.catheter), *too_thin(case, scan)]
 
 
 def doubts(cases: Sequence[Case], config: Config) -> Iterator[str]:

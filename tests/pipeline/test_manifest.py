@@ -19,7 +19,15 @@ from pipeline.model import Array
 from pipeline.ranges import Name
 from pipeline.study.devices import implausible
 from pipeline.study.manifest import ManifestError, read_manifest
-from pipeline.study.plausible import in_case, measured_otherwise, odd_depths, odd_truth, other_voxels, wrapped_rolls
+from pipeline.study.plausible import (
+    in_case,
+    lost_header,
+    measured_otherwise,
+    odd_depths,
+    odd_truth,
+    other_voxels,
+    wrapped_rolls,
+)
 from pipeline.study.same_scans import continued
 from pipeline.study.settings import Config
 
@@ -171,6 +179,10 @@ def test_a_clamp_cannot_be_borrowed_from_nowhere_or_in_a_ring(tmp_path: Path) ->
             ("[30.0, 5.0]]", "[30.0, 5.0]]\nrest_curvature_per_mm = 8.3"),
             "rest_curvature_per_mm of 8.3 at the most: a be",
         ),
+        (
+            ("[30.0, 5.0]]", "[30.0, 5.0]]\nrest_curvature_per_mm = [[0, 1.2], [8, 1.2], [8, 0]]"),
+            "rest_curvature_per_mm turns the wire by 550 degrees in all",
+        ),
         (("[30.0, 5.0]]", "[30.0, 5.0]]\nweight_N_per_mm = 7e-3"), "weight_N_per_mm = 0.007: a rod of"),
         (("[30.0, 5.0]]", "[30.0, 5.0]]\ntorsional_stiffness_N_mm2 = 5e-6"), "torsional_stiffness_N_mm2 = 5e-06 is 1e"),
         (("[30.0, 5.0]]", "[30.0, 5.0]]\ntorsional_stiffness_N_mm2 = 5e6"), "torsional_stiffness_N_mm2 = 5e+06 is 1e"),
@@ -182,6 +194,22 @@ def test_a_wire_in_another_unit_is_a_warning(tmp_path: Path, change: tuple[str, 
     text = GOOD.replace(*change).replace('wire = "soft"', 'wire = "soft"\ndown = [0, 0, 1]')
     notes = implausible(read_manifest(written(tmp_path, text)).cases)
     assert f"wire 'soft': {said}" in notes[0]
+
+
+@pytest.mark.parametrize(("stiffness", "told"), [(2e6, True), (0.002, True), (0.03, False), (100.0, False)])
+def test_a_wall_in_another_unit_is_a_warning(tmp_path: Path, stiffness: float, told: bool) -> None:
+    """A modulus in Pa was "no problem found", and every frame stalled with advice about tolerances."""
+    (case,) = read_manifest(written(tmp_path, f"{GOOD}\n[case.wall]\nstiffness_N_mm2 = {stiffness}\n")).cases
+    assert any("is it a modulus" in text for text in in_case(case, None)) == told
+
+
+@pytest.mark.parametrize(("spacing_mm", "origin_mm", "told"), [(1.0, 0.0, 1), (1.0, 3.0, 0), (0.5, 0.0, 0)])
+def test_a_header_that_looks_lost_is_a_warning(tmp_path: Path, spacing_mm: float, origin_mm: float, told: int) -> None:
+    """An array that was saved without its header: voxels of 1 mm from 0, 0, 0, and "no problem found"."""
+    turn = np.diag([-1.0, -1.0, 1.0])
+    header = Header(Source(tmp_path), (96,) * 3, np.full(3, spacing_mm), np.full(3, origin_mm), turn, "int16")
+    assert len(lost_header(header)) == told
+    assert lost_header(None) == []
 
 
 CATHETERS: list[tuple[float, float, str]] = [
@@ -214,6 +242,8 @@ def test_depths_in_another_unit_are_a_warning(tmp_path: Path, depths: str, said:
     header = Header(Source(tmp_path), (96, 96, 96), np.full(3, 0.5), np.zeros(3), np.eye(3), "int16")
     (case,) = read_manifest(written(tmp_path, text)).cases
     assert len(odd_depths(case, header)) == said
+    small = replace(header, spacing_mm=np.full(3, 0.05))
+    assert len(odd_depths(case, small)) == 1, "the scan's header is in cm, or the depths are"
 
 
 def test_depths_that_go_down_are_a_warning(tmp_path: Path) -> None:

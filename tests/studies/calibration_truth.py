@@ -213,6 +213,7 @@ def _case(way: Way, physics: Physics, frames: Sequence[TrueFrame], rng: np.rando
         "entry_direction": tilted.tolist(),
         "material_axis": normal_to(np.array([1.0, 0.0, 0.0]), direction).tolist(),
         "roll_deg": way.roll_deg,
+        "roll_sigma_deg": 1.0,
         "insertion_mm": (np.array(way.depths_mm) - 0.4 + rng.normal(0.0, 0.2, len(frames))).round(3).tolist(),
     }
     case |= {"push_force_N": (push + noise).tolist()} if forces else {}
