@@ -7,17 +7,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from pipeline.load import (
-    Header,
-    LoadError,
-    Scans,
-    Source,
-    each_volume,
-    read_header,
-    require_one,
-    require_same_geometry,
-    require_whole,
-)
+from pipeline.load import Header, LoadError, Scans, Source, each_volume, read_header, require_one, require_whole
 from pipeline.load.curves import read_curve, read_truth
 from pipeline.load.guard import is_folder, status_of
 from pipeline.load.lumens import read_lumen
@@ -29,6 +19,7 @@ from pipeline.simulate.others import oddity
 from pipeline.study.coarse import too_coarse
 from pipeline.study.manifest import Case, not_one_per_frame
 from pipeline.study.parameters import ParametersError, read_parameters
+from pipeline.study.same_grid import apart
 from pipeline.study.same_scans import repeated
 from pipeline.study.settings import Config
 from pipeline.study.sources import files_of, is_pattern
@@ -92,8 +83,7 @@ def _look_at_scans(case: Case, config: Config, absent: Container[Path], whole: b
     if empty is not None:
         found.tried(require_one, empty)
     scans = Scans(empty, tuple(volume for header in frames if header for volume in each_volume(header)))
-    for header in scans.frames:
-        found.tried(require_same_geometry, scans.all[0], header)
+    found += apart(scans.all)
     found += entry_problems(case, scans)
     return None if None in frames else len(scans.frames) or case.frame_count
 

@@ -1,0 +1,33 @@
+"""Scans of one case that do not lie on one grid: which is the odd one, said once."""
+
+from collections.abc import Sequence
+
+from pipeline.load import Header, LoadError, require_same_geometry
+
+
+def apart(headers: Sequence[Header]) -> list[str]:
+    """A problem where scans lie on other grids than the first, or the first on another than all others: of many, one
+    sentence.
+    """
+    if len(headers) < 2:
+        return []
+    first, *others = headers
+    wrong = [(header, text) for header in others if (text := _against(first, header))]
+    if not wrong:
+        return []
+    text = wrong[0][1]
+    if len(wrong) == 1:
+        return [text]
+    if len(wrong) == len(others) and not any(_against(others[0], header) for header in others[1:]):
+        return [
+            f"{first.source} is the odd one of {len(headers)} scans, the others lie on one grid; take it out? {text}"
+        ]
+    return [f"{text} So do {len(wrong) - 1} more of {len(headers)} scans"]
+
+
+def _against(one: Header, other: Header) -> str:
+    try:
+        require_same_geometry(one, other)
+    except LoadError as error:
+        return str(error)
+    return ""
