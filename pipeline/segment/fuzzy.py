@@ -24,6 +24,9 @@ _MOVE = "move entry_mm (or lumen_seed_mm, where the case gives it) well into the
 """entry_mm first: it is the seed of every case that gives no other."""
 
 
+INVERTED = "; or the scan is inverted (the vessel dark, or grey that rises the other way): turn its grey round"
+
+
 def _at(grid: Grid, seeds: Index) -> str:
     """Where the seeds lie, and the grey there: a seed beside the vessel is what most often goes wrong."""
     said = [
@@ -41,7 +44,8 @@ def _start(grid: Grid, seeds: Index) -> tuple[GreyLevels, Index]:
         got = f"grey: got {levels.inside:.0f} at the seed, {levels.outside:.0f} around, noise {levels.noise:.0f}"
         got += _at(grid, seeds)
         allowed = "a lumen brighter than its surroundings by twice the noise"
-        raise failed(got, allowed, _MOVE)
+        dark = levels.contrast < -LEAST_CONTRAST * levels.noise  # contrast is inside less outside
+        raise failed(got, allowed, f"{_MOVE}{INVERTED * dark}")
     return levels, np.array([f[1] for f in found], np.int64)
 
 

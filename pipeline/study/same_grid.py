@@ -19,10 +19,9 @@ def apart(headers: Sequence[Header]) -> list[str]:
     if len(wrong) == 1:
         return [text]
     if len(wrong) == len(others) and not any(_against(others[0], header) for header in others[1:]):
-        return [
-            f"{first.source} is the odd one of {len(headers)} scans, the others lie on one grid; take it out? {text}"
-        ]
-    return [f"{text} So do {len(wrong) - 1} more of {len(headers)} scans"]
+        odd = f"{first.source} is the odd one of {len(headers)} scans, the others lie on one grid"
+        return [f"{odd}; is it one of them? {text}"]
+    return [f"{text} Of {len(headers)} scans {len(wrong) - 1} more differ from the first."]
 
 
 def _against(one: Header, other: Header) -> str:

@@ -140,3 +140,12 @@ def test_seeds_outside_the_scan_are_told_where_it_lies() -> None:
     with pytest.raises(StageError, match=re.escape("a point inside the scan, [1.0, 2.0, 3.0] to [2.5, 4.0, 5.5] mm")):
         seed_voxels(grid, [[90.0, 0.0, 0.0]])
     np.testing.assert_array_equal(seed_voxels(grid, [[90.0, 0.0, 0.0], [1.6, 2.0, 5.4]]), [[1, 0, 5]])
+
+
+def test_a_dark_vessel_is_told_as_an_inverted_scan():
+    """The advice was to move the entry."""
+    curve, origin, clean = tube(1.5)
+    rng = np.random.default_rng(0)
+    dark = Volume(np.float32(2000.0 - clean + rng.normal(0.0, 20.0, clean.shape)), [VOXEL] * 3, origin)
+    with pytest.raises(StageError, match="or the scan is inverted"):
+        segment(dark, curve[len(curve) // 2][None])

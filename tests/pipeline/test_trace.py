@@ -234,7 +234,7 @@ def test_a_bend_that_passes_through_the_rotation_plane_is_no_warning():
     def told(share):
         marks = np.arange(100) < 100 * share
         curve = Curve(np.zeros((100, 3)), np.zeros(100), in_plane=marks)
-        return _in_plane([Frame(0, curve=curve)], 10.0)
+        return _in_plane([Frame(0, curve=curve)], TraceConfig(in_plane_deg=10.0))
 
     assert told(0.0) == told(0.05) == told(0.17) == []
     assert told(0.5)[0].startswith("50 % of the traced points run within 10 degrees of the plane of rotation")

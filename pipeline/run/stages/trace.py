@@ -39,6 +39,7 @@ from pipeline.segment.opened import opened
 from pipeline.simulate import wall_of
 from pipeline.status import FrameStatus, StageError
 from pipeline.trace import cleared, of_catheter, trace
+from pipeline.trace.config import TraceConfig
 from pipeline.trace.saturated import cut_off, saturated
 
 
@@ -71,7 +72,7 @@ def trace_frames(run: Context, known: Known) -> Known:
         run.log.warnings += cut_off([(f.index, curve) for f in frames if (curve := f.trusted_curve) is not None])
     run.log.warnings += beside_what_is_seen(frames, [part.seen for part in parts], run.config.trace, voxel_mm)
     run.log.warnings += work.wire_in_reference
-    run.log.warnings += _in_plane(frames, run.config.trace.in_plane_deg)
+    run.log.warnings += _in_plane(frames, run.config.trace)
     assumed, doubtful = sentences_of(work.alignment, {frame.index: frame.registration for frame in frames})
     run.log.assumptions += assumed
     run.log.warnings += doubtful
@@ -230,7 +231,7 @@ def _last_curve(number: int, earlier: Earlier[_Part]) -> Curve:
     return next((curve for curve in curves if curve.status is FrameStatus.OK and len(curve.points_mm)), NOTHING)
 
 
-def _in_plane(frames: list[Frame], limit_deg: float) -> list[str]:
+def _in_plane(frames: list[Frame], settings: TraceConfig) -> list[str]:
     """A warning where more of the traced wire runs in the plane of the scanner's rotation than by chance.
 
     Of evenly distributed directions a share of sin(limit_deg) lies that near to a plane, 0.17 at 10 degrees. A bend may
@@ -238,9 +239,13 @@ def _in_plane(frames: list[Frame], limit_deg: float) -> list[str]:
     """
     curves = [f.curve for f in frames if f.curve is not None and len(f.curve.points_mm)]
     marks = np.concatenate([np.asarray(c.in_plane) for c in curves]) if curves else np.zeros(0, bool)
+    limit_deg = settings.in_plane_deg
     if not marks.any() or marks.mean() <= np.sin(np.radians(limit_deg)):
         return []
+    axis = (
+        "" if settings.rotation_axis else " (across the scan's third axis, unless trace.rotation_axis says otherwise)"
+    )
     return [
-        f"{100 * marks.mean():.0f} % of the traced points run within {limit_deg:g} degrees of the plane of rotation, "
-        "where cone-beam scans streak and resolve the rotation axis least (trace_flags 2 in frames.h5)"
+        f"{100 * marks.mean():.0f} % of the traced points run within {limit_deg:g} degrees of the plane of rotation"
+        f"{axis}, where cone-beam scans streak and resolve the rotation axis least (trace_flags 2 in frames.h5)"
     ]
