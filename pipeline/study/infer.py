@@ -84,6 +84,19 @@ def _deeper(folder: Path) -> str:
     )
 
 
+def looks_wire_free(path: Path) -> bool:
+    """Whether a file is named as a scan without the wire: reference.mha, empty_phantom.nii.gz."""
+    stem = path.name.lower().split(".")[0]
+    return any(stem == name or stem.startswith((f"{name}_", f"{name}-")) for name in REFERENCE_NAMES)
+
+
+def beside(frames: Sequence[Path]) -> list[Path]:
+    """Scans that are named as ones without the wire, in the folder of a case's frames and in that above it."""
+    places = dict.fromkeys(place for path in frames for place in (path.parent, path.parent.parent))
+    found = [p for place in places if place.is_dir() for p in sorted(place.iterdir()) if looks_wire_free(p)]
+    return [p for p in found if _is_scan(p) and p not in frames]
+
+
 def _scans_in(folder: Path, stated: Path | None) -> tuple[Path | None, list[Path], list[Path]]:
     """The reference, stated or by its name, the frames, and what is neither: named as a reference beside a stated one.
 
@@ -93,7 +106,7 @@ def _scans_in(folder: Path, stated: Path | None) -> tuple[Path | None, list[Path
     if not below and _is_scan(folder):
         return None, [folder], []
     below.sort(key=lambda p: natural_key(p.relative_to(folder).as_posix()))
-    named = [p for p in below if p.name.lower().split(".")[0] in REFERENCE_NAMES]
+    named = [p for p in below if looks_wire_free(p)]
     if stated is None and len(named) > 1:
         names = " and ".join(p.relative_to(folder).as_posix() for p in named)
         raise unusable(folder, f"{names}: each has the name of a scan without wire; say which: --reference FILE")

@@ -10,6 +10,7 @@ from pipeline.load.curves import read_truth
 from pipeline.model import Array, arc_length
 from pipeline.simulate.others import oddity
 from pipeline.study.devices import implausible, odd_catheter, odd_wall
+from pipeline.study.infer import beside
 from pipeline.study.manifest import Case
 from pipeline.study.same_scans import continued, shared
 from pipeline.study.settings import Config
@@ -143,6 +144,19 @@ def other_voxels(header: Header | None) -> list[str]:
     return [f"spacing_mm: {note}; is that meant?" for note in notes if "where the file has" in note]
 
 
+def forgotten_reference(case: Case) -> list[str]:
+    """A sentence where a case has no reference, and a scan lies beside its frames that is named as one."""
+    if case.reference is not None or not case.frames or case.traces:
+        return []
+    found = beside([source.path for source in case.frames])
+    if not found:
+        return []
+    return [
+        f"no reference, though {found[0].name} lies beside the frames: the lumen comes from frame 0, with the wire in "
+        f'it; add reference = "{found[0].name}" (with its folder), or rename it'
+    ]
+
+
 def lost_header(header: Header | None) -> list[str]:
     """A sentence where a scan has voxels of just 1 mm from 0, 0, 0 along the axes: as where its header was lost."""
     if header is None:
@@ -179,7 +193,13 @@ def too_thin(case: Case, header: Header | None) -> list[str]:
 
 def in_case(case: Case, scan: Header | None) -> list[str]:
     """What is doubtful in a case beside its wire and its truth. scan : header of a scan of the case."""
-    of_scan = [*other_voxels(scan), *lost_header(scan), *leads_out(case, scan), *odd_depths(case, scan)]
+    of_scan = [
+        *forgotten_reference(case),
+        *other_voxels(scan),
+        *lost_header(scan),
+        *leads_out(case, scan),
+        *odd_depths(case, scan),
+    ]
     return [*of_scan, *wrapped_rolls(case), *odd_wall(case.wall), *odd_catheter(case.catheter), *too_thin(case, scan)]
 
 

@@ -212,6 +212,19 @@ def test_a_header_that_looks_lost_is_a_warning(tmp_path: Path, spacing_mm: float
     assert lost_header(None) == []
 
 
+@pytest.mark.parametrize(
+    ("name", "told"), [("reference.mha", True), ("empty_phantom.nii.gz", True), ("preference.mha", False)]
+)
+def test_a_reference_that_nobody_listed_is_a_warning(tmp_path: Path, name: str, told: bool) -> None:
+    """The lumen came from frame 0, with the wire in it, and what was said was of bones."""
+    manifest = written(tmp_path, GOOD)
+    (tmp_path / name).touch()
+    (case,) = read_manifest(manifest).cases
+    assert any(f"no reference, though {name} lies beside the frames" in text for text in in_case(case, None)) == told
+    (named,) = read_manifest(written(tmp_path, GOOD.replace("frames = ", f'reference = "{name}"\nframes = '))).cases
+    assert not any("no reference" in text for text in in_case(named, None))
+
+
 CATHETERS: list[tuple[float, float, str]] = [
     (50.0, 0.9, ""),
     (0.0, 0.9, ""),
