@@ -111,7 +111,7 @@ def _unknown_roll(statistics: Mapping[str, Any], simulator: str) -> str:
         mend = "check axes (LPS or RAS) and the roll that it was simulated with"
     elif _number(statistics.get("frames_fitted")) > 0:
         mend = "check axes (LPS or RAS) and the wire's tip; the roll was fitted on a frame: state it, or begin deeper"
-    return f"It is worse than with an unknown roll ({number(unknown)} mm): {mend}."
+    return f"The wire is worse than with an unknown roll ({number(unknown)} mm): {mend}."
 
 
 def tips_off(statistics: Mapping[str, Any]) -> str:
@@ -123,9 +123,9 @@ def tips_off(statistics: Mapping[str, Any]) -> str:
         missing = f"{100 * (1 - covered):.0f} % of the traced wires have no simulated one near: {unseen}"
         return missing if covered < LEAST_COVERED and most <= NEAR_MM else ""
     if along > 0.5 * tip:  # what lies beyond the trace counts with its distance from the trace's end
-        return f"It ends {number(along)} mm beyond (median): judge by tip_median_mm."
+        return f"The wire ends {number(along)} mm beyond (median): judge by tip_median_mm."
     where = f"ends {number(-along)} mm short" if -along > 0.5 * tip else f"has its tip {number(tip)} mm off"
-    return f"It {where} (median): {unseen}"
+    return f"The wire {where} (median): {unseen}"
 
 
 def standing(statistics: Mapping[str, Any]) -> str:
@@ -237,7 +237,7 @@ def _few_insertions(statistics: Mapping[str, Any]) -> str:
 def of_these_alone(statistics: Mapping[str, Any]) -> str:
     """That a skill without an interval speaks of the insertions that there are: with three it may not be shown."""
     withheld = "withheld" in str(statistics.get("interval")) and _skill(statistics)[1] > 0.0
-    return "It is of these insertions alone: what others would give takes three at least." * withheld
+    return "The skill is of these insertions alone: three at least would tell what others give." * withheld
 
 
 def _of_frames(statistics: Mapping[str, Any]) -> str:

@@ -59,7 +59,7 @@ def test_a_skill_of_one_insertion_says_nothing_of_others() -> None:
     """Three insertions were "not shown to be better"; with one group for them the same wires were better, full stop."""
     row = {"skill_strongest": 0.988, "strongest_null": "previous"}
     alone = "interval withheld: 1 insertion, at least 3 needed"
-    assert of_these_alone(row | {"interval": alone}).startswith("It is of these insertions alone")
+    assert of_these_alone(row | {"interval": alone}).startswith("The skill is of these insertions alone")
     assert not of_these_alone(row | {"interval": "wide: 3 insertions"})
     assert not of_these_alone(row | {"interval": alone, "skill_strongest": -0.1}), "that is worse, of whatever"
 

@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.arrays.polyline import resample
+from pipeline.arrays.polyline import at_arc, resample, samples
+from pipeline.compare.metrics import rms
 from pipeline.load.wires import OtherFile, read_wires
 from pipeline.model import Array, OtherWire, Wire, arc_length
 from pipeline.run.stages.in_itself import not_in_itself
@@ -28,6 +29,8 @@ from reports.case_files import counted
 from solver.self_contact import self_overlap_mm
 
 STEP_MM = 0.25
+LEAST_ASIDE_MM, MOST_LEFT = 0.5, 0.35
+"""Shift of all wires against the traced ones from which it is told, and the share of it that may be left without it."""
 MOST_OUTSIDE = 0.2
 """Share of a wire outside the lumen from which on it is asked whether its x and y are turned."""
 
@@ -46,7 +49,7 @@ def frames_of_others(run: Context, known: Known) -> tuple[Frame, ...]:
     wires = {f.index: f.simulated.joints_mm for f in frames if f.simulated is not None}
     voxel_mm = float(min(known.lumen.distance.spacing_mm))
     log.warnings += _in_another_order(frames)
-    log.warnings += _outside(known, wires, case.wire.radius_mm)
+    log.warnings += [*_outside(known, wires, case.wire.radius_mm), *_aside(frames)]
     log.warnings += rough(wires, voxel_mm, "the simulated wires", "give a point every millimetre")
     log.warnings += _kinked(wires, case.wire)
     return tuple(frames)
@@ -114,6 +117,27 @@ def _clearance(known: Known, points: Array) -> Array:
     """Distance (n,) of equal steps along a wire to the lumen's wall, mm, negative inside."""
     assert known.lumen is not None
     return wall_of(known.lumen.distance, "offset").look_up(resample(points, STEP_MM))[0]
+
+
+def _aside(frames: Sequence[Frame]) -> list[str]:
+    """A warning where all wires lie aside from the traced ones by one and the same shift, and near without it."""
+    pairs = [(f.curve.points_mm, f.simulated.joints_mm) for f in frames if f.curve and f.traced and f.simulated]
+    if not pairs:
+        return []
+    apart = []
+    for traced, wire in pairs:
+        arc = samples(min(float(arc_length(points)[-1]) for points in (traced, wire)), STEP_MM)
+        apart.append(at_arc(wire, arc) - at_arc(traced, arc))
+    every = np.concatenate(apart)
+    shift = every.mean(axis=0)
+    left, size = rms(np.linalg.norm(every - shift, axis=1)), float(np.linalg.norm(shift))
+    if size < LEAST_ASIDE_MM or left > MOST_LEFT * size:
+        return []
+    place = ", ".join(f"{x:.1f}" for x in shift)
+    return [
+        f"the wires lie ({place}) mm aside from the traced ones, alike in {counted(len(pairs), 'frame')} (without that "
+        f"{left:.2g} mm rms are left): is their origin that of the scans?"
+    ]
 
 
 def _outside(known: Known, wires: Mapping[int, Array], radius_mm: float) -> list[str]:
