@@ -26,6 +26,9 @@ _AROUND = np.array([p for p in np.ndindex(7, 7, 7) if np.linalg.norm(np.subtract
 MOST_APART = 3.0
 """Slice distance over pixel size from which no curve is accepted: of 22 wires in slices of 2 mm and pixels of 0.5 mm,
 with insertion_mm stated, 5 had the stated length and 3 of these were over 1.5 pixels off, at the tip or all along."""
+ENDS_OUTSIDE_VOXELS = 2.0
+"""How far outside the lumen a curve may end: grey is read up to HALO_VOXELS of it, and wires that went on through a
+wall, or beyond the end of the contrast medium, were cut off there, ok (2 to 8 mm of them, 51 of 97)."""
 LATE_MM, LATE_VOXELS = 1.0, 2.0
 """Their sum: a curve that begins further than that beyond the plane of entry lacks wire (3 mm in correlated noise)."""
 END_VOXELS, EVEN_END_VOXELS, STATED_END_VOXELS = 1.75, 3.0, 1.5
@@ -116,6 +119,7 @@ def of_the_ends(
     """What may be wrong with where a curve (n, 3) begins and ends. folded : its tip lies beside another strand."""
     missing_mm = attempt.tube.steps.missing_mm
     back_mm, on_mm, sure_mm = _end_range(image, attempt)
+    beyond_wall = float(image.depth_at(points[-1:])[0]) / image.voxel
     return (
         (missing_mm > 0.0, FrameStatus.TRACE_AMBIGUOUS,
          f"a line that ends {missing_mm:.1f} mm before the tip, by the wire's opacity", "one that goes to the tip",
@@ -143,6 +147,10 @@ def of_the_ends(
          f"a lumen that ends at {_named(image, points[-1])} mm, and something bright beyond it",
          "a lumen that holds the tip",
          "look whether the vessel goes on there (segment.threshold, lumen), or bone touches it"),
+        (beyond_wall > ENDS_OUTSIDE_VOXELS, FrameStatus.TRACE_LEFT_LUMEN,
+         f"a curve that ends {beyond_wall * image.voxel:.1f} mm outside the lumen, at {_named(image, points[-1])} mm, "
+         "where no more of the scan is read", f"{ENDS_OUTSIDE_VOXELS * image.voxel:.1f} mm at most",
+         "look whether the wire leaves the vessel there, or the vessel goes on (segment.threshold, lumen)"),
         (folded and not attempt.from_previous, FrameStatus.TRACE_AMBIGUOUS,
          "a tip beside another strand of the wire", f"{TIP_BESIDE} voxels between them",
          "list a frame of a smaller depth before it, or look where the wire ends"),
@@ -167,6 +175,16 @@ def of_its_width(
         (oblong > 0.0, FrameStatus.TRACE_AMBIGUOUS,
          f"an end {oblong:.1f} times as far out of round as the line before it", f"{OUT_OF_ROUND[1]:g} times at most",
          "look whether the tip is folded back beside the wire, or another device lies there; give its curve (traces)"),
+    )  # fmt: skip
+
+
+def of_the_frame(image: Subtraction) -> tuple[Objection, ...]:
+    """Why a frame shows no wire as it was, whatever is traced in it."""
+    copied = image.levels.get("copied", 0.0)
+    return (
+        (copied > 0.0, FrameStatus.TRACE_AMBIGUOUS,
+         f"{100 * copied:.0f} % of the lumen's voxels as the reference has them, to the last bit", "a scan of its own",
+         "look whether the frame was written whole; export it again"),
     )  # fmt: skip
 
 
@@ -202,11 +220,7 @@ def of_the_whole(image: Subtraction, attempt: Attempt, points: Array, length_mm:
     """Why a curve (n, 3) may be no wire, or not one."""
     step = length_mm / max(1, len(points) - 1)
     turn = sharpest_turn_deg(points[: -max(1, round(J_MM / max(step, 1e-9)))], step, HAIRPIN_VOXELS * image.voxel)
-    copied = image.levels.get("copied", 0.0)
     return (
-        (copied > 0.0, FrameStatus.TRACE_AMBIGUOUS,
-         f"{100 * copied:.0f} % of the lumen's voxels as the reference has them, to the last bit", "a scan of its own",
-         "look whether the frame was written whole; export it again"),
         (image.slices_apart >= MOST_APART, FrameStatus.TRACE_AMBIGUOUS,
          f"slices {image.slices_apart:.1f} times as far apart as pixels",
          f"less than {MOST_APART} times",

@@ -52,7 +52,12 @@ class SearchRegion:
     @cached_property
     def sample(self) -> NDArray[np.int64]:
         """Voxels (n, 3) of 2000 runs or so: enough for a median."""
-        return voxels_of(self.runs[:: max(1, len(self.runs) // 2000)])
+        return voxels_of(self.sampled_runs)
+
+    @property
+    def sampled_runs(self) -> NDArray[np.int64]:
+        """The runs (m, 4) of ``sample``."""
+        return self.runs[:: max(1, len(self.runs) // 2000)]
 
     @cached_property
     def inner(self) -> NDArray[np.int64]:

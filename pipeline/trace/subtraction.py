@@ -172,6 +172,10 @@ class Subtraction:
         return np.asarray(box.values[tuple(index.T)])
 
 
+def _sampled(grid: Grid, region: SearchRegion) -> NDArray[Any]:
+    return np.asarray(grid.values[tuple((region.sample + region.corner).T)])
+
+
 def subtracted(frame: Volume, lumen: Lumen, reference: Volume | None) -> Subtraction:
     """Subtract the background at the lumen's voxels; one pass over them, no copy of the frame."""
     grid, axes = in_memory_order(frame)
@@ -185,7 +189,7 @@ def subtracted(frame: Volume, lumen: Lumen, reference: Volume | None) -> Subtrac
     counters = {"voxels_total": total, "voxels_read": read, "voxels_skipped": total - read}
     blur = wall_blur(lumen, float(np.min(region.box.spacing_mm)))
     modelled, levels = reference is None or gain != 1.0, {"noise": noise, "gain": gain}
-    if still is not None and (copied := copied_share(grid.values[tuple((region.sample + region.corner).T)], still)):
+    if still is not None and (copied := copied_share(_sampled(grid, region), still, region.sampled_runs)):
         levels["copied"] = copied
     uneven = modelled and lumen.levels.get("least_filling", 1.0) < UNEVEN
     return Subtraction(region, grey, max(noise, 1e-6), modelled, blur, grid, uneven, counters, levels)

@@ -15,6 +15,7 @@ from pipeline.trace.ends import (
     of_a_pair,
     of_its_width,
     of_the_ends,
+    of_the_frame,
     of_the_way,
     of_the_whole,
 )
@@ -161,11 +162,11 @@ def judge(image: Subtraction, attempt: Attempt, points: Array, bridged: NDArray[
         double |= doubled(alone, section.oblong, np.maximum(DOUBLE, 1.0 + 4.0 * noise), section.noise)
     outside = _outside(image, points)
     faint_mm, double_mm = (float(np.count_nonzero(m)) * step for m in (faint & ~bridged, double))
-    objections = of_the_way(attempt, length_mm)
+    objections = of_the_frame(image) + of_the_way(attempt, length_mm)
     objections += _of_the_line(image, attempt, points, (share, noise, outside), (faint_mm, double_mm, length_mm))
     folded = bool(beside_itself(points, step, TIP_BESIDE * image.voxel)[-1])
     fitted = as_fitted(image, attempt.tube, points)
-    pair = 0.0 if image.thick_slices else _pair(image, section, fitted, length_mm)
+    pair = 0.0 if image.thick_slices else _pair(image, section, fitted, points, length_mm)
     objections += of_a_pair(pair, attempt)
     objections += of_the_ends(image, attempt, points, length_mm, folded=folded)
     objections += of_its_width(image, attempt, points, (read, fitted), folded=folded)
@@ -174,11 +175,10 @@ def judge(image: Subtraction, attempt: Attempt, points: Array, bridged: NDArray[
     return Verdict(*first, bridged | faint | double | outside, faint_mm, double_mm)
 
 
-def _pair(image: Subtraction, section: Section, fitted: tuple[Array, Array], length_mm: float) -> float:
+def _pair(image: Subtraction, section: Section, fitted: tuple[Array, Array], points: Array, length_mm: float) -> float:
     """How far out of round the line is, all along or in part, over what one wire's may be."""
-    return max(
-        paired(image, section, length_mm), paired_in_part(image, section, np.asarray(second_harmonic(fitted[0])))
-    )
+    in_part = paired_in_part(image, section, second_harmonic(fitted[0]), points)
+    return max(paired(image, section, length_mm), in_part)
 
 
 def _of_the_line(

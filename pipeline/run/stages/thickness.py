@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from pipeline.model import Curve, Lumen
 from pipeline.run.stages.known import Frame
 from pipeline.status import FrameStatus
+from pipeline.trace.saturated import LEVEL
 
 LEAST_SHARE = 0.9
 """Ratio of the seen to the stated radius below which the latter is doubted. It is 1.15 to 2.1 in 17 scenes of the
@@ -41,7 +42,7 @@ def not_too_thick(curve: Curve, lumen: Lumen, radius_mm: float) -> Curve:
     """The curve; ambiguous where its line is too thick for a wire of this radius: a rod, a catheter, another wire."""
     seen = _seen_radius_mm(curve.levels.get("blur_mm", float("nan")), lumen)
     most = max(MOST_SHARE * radius_mm, radius_mm + MORE_VOXELS * float(np.min(lumen.distance.spacing_mm)))
-    if curve.status is not FrameStatus.OK or not seen > most:
+    if curve.status is not FrameStatus.OK or not seen > most or LEVEL in curve.levels:  # what is cut off looks wide
         return curve
     note = (
         f"trace: wire: got a line that looks {2.0 * seen:.2f} mm thick; expected {2.0 * most:.2f} mm at most of a wire "
