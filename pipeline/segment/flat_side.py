@@ -34,8 +34,8 @@ def flat_side(distance: Grid) -> tuple[str, ...]:
     way = ", ".join(f"{x:.2f}" for x in tried[best] @ distance.direction.T)
     return (
         f"segment: {100 * share[best]:.0f} % of the vessel's wall is flat and faces one way, LPS ({way}): where that "
-        "is up, the contrast medium may fill the vessel in part, and the lumen is that part; or the scan's edge cuts it, "
-        "or it is made so; look at the picture, fill it, or give the lumen as a file (manifest key lumen)",
+        "is up, the contrast medium may fill the vessel in part, and the lumen is that part; or the scan's edge cuts "
+        "it, or it is made so; look at the picture, fill it, or give the lumen as a file (manifest key lumen)",
     )
 
 
