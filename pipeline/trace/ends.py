@@ -119,7 +119,6 @@ def of_the_ends(
     """What may be wrong with where a curve (n, 3) begins and ends. folded : its tip lies beside another strand."""
     missing_mm = attempt.tube.steps.missing_mm
     back_mm, on_mm, sure_mm = _end_range(image, attempt)
-    beyond_wall = float(image.depth_at(points[-1:])[0]) / image.voxel
     return (
         (missing_mm > 0.0, FrameStatus.TRACE_AMBIGUOUS,
          f"a line that ends {missing_mm:.1f} mm before the tip, by the wire's opacity", "one that goes to the tip",
@@ -143,6 +142,16 @@ def of_the_ends(
         (attempt.goes_on, FrameStatus.TRACE_AMBIGUOUS,
          f"a line {GOES_ON}", "a tip with nothing beyond it",
          "look whether the wire's end is fainter than the rest"),
+        (folded and not attempt.from_previous, FrameStatus.TRACE_AMBIGUOUS,
+         "a tip beside another strand of the wire", f"{TIP_BESIDE} voxels between them",
+         "list a frame of a smaller depth before it, or look where the wire ends"),
+    )  # fmt: skip
+
+
+def of_the_lumen(image: Subtraction, points: Array) -> tuple[Objection, ...]:
+    """Why a curve (n, 3) may end where the lumen does, and not the wire."""
+    beyond_wall = float(image.depth_at(points[-1:])[0]) / image.voxel
+    return (
         (seen_outside(image, points), FrameStatus.TRACE_LEFT_LUMEN,
          f"a lumen that ends at {_named(image, points[-1])} mm, and something bright beyond it",
          "a lumen that holds the tip",
@@ -151,9 +160,6 @@ def of_the_ends(
          f"a curve that ends {beyond_wall * image.voxel:.1f} mm outside the lumen, at {_named(image, points[-1])} mm, "
          "where no more of the scan is read", f"{ENDS_OUTSIDE_VOXELS * image.voxel:.1f} mm at most",
          "look whether the wire leaves the vessel there, or the vessel goes on (segment.threshold, lumen)"),
-        (folded and not attempt.from_previous, FrameStatus.TRACE_AMBIGUOUS,
-         "a tip beside another strand of the wire", f"{TIP_BESIDE} voxels between them",
-         "list a frame of a smaller depth before it, or look where the wire ends"),
     )  # fmt: skip
 
 
