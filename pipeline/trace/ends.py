@@ -26,7 +26,7 @@ _AROUND = np.array([p for p in np.ndindex(7, 7, 7) if np.linalg.norm(np.subtract
 MOST_APART = 3.0
 """Slice distance over pixel size from which no curve is accepted: of 22 wires in slices of 2 mm and pixels of 0.5 mm,
 with insertion_mm stated, 5 had the stated length and 3 of these were over 1.5 pixels off, at the tip or all along."""
-ENDS_OUTSIDE_VOXELS = 2.0
+ENDS_OUTSIDE_VOXELS = 3.0
 """How far outside the lumen a curve may end: grey is read up to HALO_VOXELS of it, and wires that went on through a
 wall, or beyond the end of the contrast medium, were cut off there, ok (2 to 8 mm of them, 51 of 97)."""
 LATE_MM, LATE_VOXELS = 1.0, 2.0
