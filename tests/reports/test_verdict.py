@@ -135,7 +135,7 @@ def test_a_wire_that_ends_elsewhere_is_not_called_better(along: float | None, sa
     row = {"rms_mm": 0.1, "tip_median_mm": 1.9, "tip_along_median_mm": along}
     row |= {"skill_strongest": 0.9, "skill_strongest_low": 0.8, "strongest_null": "previous"}
     assert badge("ok", True, row) == {"text": "the tips lie off", "look": "poor"}
-    assert f"It {said} (median)" in verdict(row)
+    assert f"The wire {said} (median)" in verdict(row)
     assert ("rms_mm does not see that" in verdict(row)) is (along != 1.9), "what lies beyond the trace is seen"
     assert ("judge by tip_median_mm, and by back_rms_mm of errors.csv" in verdict(row)) is (along != 1.9)
     assert "That is better" not in verdict(row)
