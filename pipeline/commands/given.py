@@ -74,6 +74,7 @@ def given(args: argparse.Namespace, keep: Path | None = None) -> "Manifest":
             raise InputError([f"{', '.join(unused)}: of a folder of scans; {path} is a manifest, which says it itself"])
         return read_manifest(path)
     text, seen, _ = inferred(args)
+    seen = (*_other_manifests(path), *seen)
     if not getattr(args, "quiet", False):  # not every verb has it
         say("\n".join([text, *seen]))
     if keep is None:
@@ -82,6 +83,13 @@ def given(args: argparse.Namespace, keep: Path | None = None) -> "Manifest":
     written = keep / INFERRED
     write_text(written, text)
     return read_manifest(written)
+
+
+def _other_manifests(folder: Path) -> list[str]:
+    """A sentence where a folder without manifest.toml holds files that may be one."""
+    found = sorted(path.name for path in folder.glob("*.toml"))
+    names = ", ".join(found[:3])
+    return [f"no {NAME} in {folder}, though it holds {names}: name the file instead of the folder"] * bool(found)
 
 
 def _said_of_scans(args: argparse.Namespace) -> list[str]:

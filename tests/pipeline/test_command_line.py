@@ -18,6 +18,7 @@ import pytest
 import SimpleITK as sitk
 
 from pipeline.cli import main
+from pipeline.commands.given import _other_manifests
 from pipeline.run.gate import Gate, gate
 from pipeline.streams import Lasting
 from pipeline.study.explain import described
@@ -693,3 +694,11 @@ def test_check_sees_an_entry_direction_that_is_turned_round(study: Path, capsys:
     heard = capsys.readouterr()
     assert "warning: entry_direction leads out of the scan" in heard.err
     assert len(heard.out.splitlines()) == 1, "-q prints the result alone"
+
+
+def test_a_folder_that_holds_another_manifest_says_so(tmp_path: Path) -> None:
+    """One was inferred from the scans beside good.toml, and judged instead."""
+    assert _other_manifests(tmp_path) == []
+    (tmp_path / "good.toml").touch()
+    (said,) = _other_manifests(tmp_path)
+    assert "though it holds good.toml: name the file instead of the folder" in said

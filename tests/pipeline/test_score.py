@@ -23,7 +23,9 @@ from pipeline.commands.score import said_once
 from pipeline.load.geometry import LoadError, Source
 from pipeline.load.vtk import read_vtk_points
 from pipeline.load.wires import numbered_frames, read_wires
-from pipeline.model import arc_length
+from pipeline.model import Curve, OtherWire, arc_length
+from pipeline.run.stages.known import Frame
+from pipeline.run.stages.others import _aside
 from pipeline.simulate.others import begun, not_to_depth, numbered_otherwise, oddity, out_of_order, tightest_bend
 from pipeline.status import InputError
 from pipeline.study.others import named
@@ -269,6 +271,23 @@ def test_wires_with_the_depths_of_other_frames_are_told() -> None:
     assert numbered_otherwise(depths - 0.7, depths) == 0, "too short, and no other frame's"
     assert numbered_otherwise(np.array([np.nan, 12.5, 14.0, np.nan, 16.4]), depths) == 0, "in two frames alone"
     assert numbered_otherwise(np.array([11.3, np.nan, 14.0, 15.1, 16.4]), depths) == 1
+
+
+@pytest.mark.parametrize(
+    ("shift_mm", "noise_mm", "told"),
+    [((0.0, 3.0, 0.0), 0.01, True), ((0.0, 0.3, 0.0), 0.0, False), ((1.0, 0.0, 0.0), 0.6, False)],
+)
+def test_wires_that_all_lie_aside_are_told(shift_mm: tuple[float, ...], noise_mm: float, told: bool) -> None:
+    """3 mm in y: what was said was of axes and rolls."""
+    rng, frames = np.random.default_rng(0), []
+    for n in range(3):
+        line = np.column_stack([np.zeros((30, 2)), np.linspace(0.0, 20.0 + 5.0 * n, 30)])
+        wire = line + shift_mm + rng.normal(0.0, noise_mm, line.shape)
+        frames.append(Frame(n, curve=Curve(line, np.full(30, 0.02)), simulated=OtherWire(wire, 0.0)))
+    said = _aside(frames)
+    assert bool(said) == told
+    assert not told or said[0].startswith("the wires lie (0.0, 3.0")
+    assert _aside([Frame(0)]) == []
 
 
 def test_a_score_of_swapped_wires_says_so(known: Known, tmp_path: Path) -> None:

@@ -133,7 +133,7 @@ def _aside(frames: Sequence[Frame]) -> list[str]:
     left, size = rms(np.linalg.norm(every - shift, axis=1)), float(np.linalg.norm(shift))
     if size < LEAST_ASIDE_MM or left > MOST_LEFT * size:
         return []
-    place = ", ".join(f"{x:.1f}" for x in shift)
+    place = ", ".join(f"{x:.1f}" for x in shift.round(1) + 0.0)  # no -0.0
     return [
         f"the wires lie ({place}) mm aside from the traced ones, alike in {counted(len(pairs), 'frame')} (without that "
         f"{left:.2g} mm rms are left): is their origin that of the scans?"
