@@ -73,6 +73,14 @@ def sampled(grid: Grid, like: Grid, outside: float) -> Grid:
     return like.with_values(read_only(values))
 
 
+def slopes_at(grid: Grid, index: NDArray[np.int64]) -> Array:
+    """Central differences (n, 3) of a grid's values at voxels (n, 3) off its edge, along its axes; twice the slope."""
+    values = grid.values
+    steps = enumerate(np.eye(3, dtype=int))
+    slope = [(values[tuple((index + s).T)] - values[tuple((index - s).T)]) / grid.spacing_mm[a] for a, s in steps]
+    return np.stack(slope, axis=1).astype(float)
+
+
 def indices_of(mask: NDArray[np.bool_]) -> NDArray[np.int64]:
     """Indices (n, 3) where a contiguous mask is set, as ``np.argwhere``, in a fifth of its time where little is set."""
     return unflattened(np.flatnonzero(mask), mask.shape)

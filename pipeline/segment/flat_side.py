@@ -5,7 +5,7 @@ It faces up, whatever the way of the vessel, and what lies beyond it has nothing
 
 import numpy as np
 
-from pipeline.arrays.grids import unflattened
+from pipeline.arrays.grids import slopes_at, unflattened
 from pipeline.model import Array
 from solver.grid import Grid
 
@@ -45,9 +45,5 @@ def _normals(distance: Grid) -> Array:
     near = np.flatnonzero(np.abs(values) < NEAR_VOXELS * float(np.min(distance.spacing_mm)))
     index = unflattened(near[:: max(1, len(near) // LOOKED_AT)], values.shape)
     index = index[np.all((index > 0) & (index < np.array(values.shape) - 1), axis=1)]
-    slope = [
-        (values[tuple((index + step).T)] - values[tuple((index - step).T)]) / distance.spacing_mm[axis]
-        for axis, step in enumerate(np.eye(3, dtype=int))
-    ]
-    normals = np.stack(slope, axis=1).astype(float)
+    normals = slopes_at(distance, index)
     return np.asarray(normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9))

@@ -9,7 +9,7 @@ from scipy import ndimage
 from scipy.special import ndtr
 
 from pipeline.arrays.edges import layer_in
-from pipeline.arrays.grids import spread
+from pipeline.arrays.grids import slopes_at, spread
 from pipeline.model import Array, Lumen, Volume
 
 NEAR_VOXELS = 3.0
@@ -62,11 +62,7 @@ def _near(lumen: Lumen, reach_mm: float) -> tuple[Array, Array, Array]:
     near = np.flatnonzero(grid.values < reach_mm)
     index = np.stack(np.unravel_index(near[:: max(1, len(near) // POINTS)], grid.shape), axis=1)
     index = index[np.all((index > 0) & (index < np.array(grid.shape) - 1), axis=1)]
-    slope = [
-        (grid.values[tuple((index + step).T)] - grid.values[tuple((index - step).T)]) / grid.spacing_mm[axis]
-        for axis, step in enumerate(np.eye(3, dtype=int))
-    ]
-    normals = np.stack(slope, axis=1).astype(float) @ grid.direction.T
+    normals = slopes_at(grid, index) @ grid.direction.T
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
     return grid.to_mm(index), normals, grid.values[tuple(index.T)].astype(float)
 

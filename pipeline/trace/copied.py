@@ -20,9 +20,9 @@ def copied_share(grey: Array, still: Array, runs: NDArray[np.int64]) -> float:
     grey : (n,) of the frame.     runs : (m, 4) of these voxels, i, j, first k, stop k.
     """
     lengths = runs[:, 3] - runs[:, 2]
-    first = np.concatenate(
-        [np.arange(a, a + n - PIECE + 1, PIECE) for a, n in zip(np.cumsum(lengths) - lengths, lengths, strict=True)]
-    )
+    pieces = lengths // PIECE
+    begun = np.cumsum(lengths) - lengths - PIECE * (np.cumsum(pieces) - pieces)
+    first = np.repeat(begun, pieces) + PIECE * np.arange(pieces.sum())
     if not len(first) or np.count_nonzero(grey < still) < LEAST_DARKER * len(still):
         return 0.0
     same = np.count_nonzero((grey == still)[first[:, None] + np.arange(PIECE)], axis=1)
