@@ -28,7 +28,7 @@ MOST_APART = 3.0
 with insertion_mm stated, 5 had the stated length and 3 of these were over 1.5 pixels off, at the tip or all along."""
 ENDS_OUTSIDE_VOXELS = 3.0
 """How far outside the lumen a curve may end: grey is read up to HALO_VOXELS of it, and wires that went on through a
-wall, or beyond the end of the contrast medium, were cut off there, ok (2 to 8 mm of them, 51 of 97)."""
+wall, or beyond the end of the contrast medium, were cut off there, ok (2 to 5 mm of them, 26 of 62)."""
 LATE_MM, LATE_VOXELS = 1.0, 2.0
 """Their sum: a curve that begins further than that beyond the plane of entry lacks wire (3 mm in correlated noise)."""
 END_VOXELS, EVEN_END_VOXELS, STATED_END_VOXELS = 1.75, 3.0, 1.5
