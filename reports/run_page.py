@@ -27,6 +27,7 @@ from reports.case_page import case_failures, scored_or_ok, version_of
 from reports.counts import scans
 from reports.doubts import assumed, copied_from_traces, doubted, said_by_cases, twins
 from reports.figures import RunFiles, declared
+from reports.gates import closed_in, open_in
 from reports.origin import why_not_pooled
 from reports.page import Each, draw_sections, one_by_one, write_page
 from reports.records import read_json
@@ -65,6 +66,7 @@ def render_index(out_dir: Path, embed: bool = False, each: Each = one_by_one) ->
         "failures": alike(failures),
         "beside_others": (out_dir / SIMULATORS.file).exists(),
         **_not_counted(out_dir),
+        "gates": {"closed": closed_in(out_dir), "open": open_in(out_dir)},
         "assumptions": assumed(out_dir),
         "warnings": [*doubts, *said_by_cases({case.name: case.result for case in cases}, "warnings")],
         "numbers": _content.in_tiles(_content.overall(declared("overall"), whole)),
@@ -134,7 +136,9 @@ def _status(out_dir: Path, failures: Sequence[Any], mixed: str) -> str:
     """The worst that can be said of a run in a word or two."""
     if failures:
         return "failures"
-    return "cases missing" if not_run(out_dir) else "not pooled" if mixed else "ok"
+    if not_run(out_dir):
+        return "cases missing"
+    return "not pooled" if mixed else "gate closed" if closed_in(out_dir) else "ok"
 
 
 def _worse_cases(summary: pd.DataFrame, links: Mapping[str, str]) -> dict[str, Any]:

@@ -11,6 +11,7 @@ from reports import _content
 from reports.case_files import counted, listed, not_reached, not_run_sentence
 from reports.doubts import copied_from_traces, doubted, twins, warnings_in
 from reports.figures.simulators import SimulatorFiles, leads
+from reports.gates import closed_in
 from reports.origin import why_not_pooled
 from reports.page import draw_sections, write_page
 from reports.schema import OURS, OVERALL_FILE, SIMULATORS, SUMMARY, WHERE, Column
@@ -78,8 +79,10 @@ def _said(alone: Mapping[Any, Any], folder: Path, lines: Sequence[str], copied: 
         row.pop("skill", None)
     missing, mixed, good = not_run_sentence(folder), why_not_pooled(folder), alone["frames_ok"]
     failed = f"On {good} of {alone['frames']} frames: " if good < alone["frames"] else ""
+    closed = closed_in(folder)
     status = "cases missing" if missing else "frames failed" if failed else "not pooled" if mixed else "ok"
-    doubt = Doubt(copied if status == "ok" else "", twins(doubted(folder)))
+    status = "gate closed" if status == "ok" and closed else status
+    doubt = Doubt("" if missing or failed or mixed else copied, twins(doubted(folder)))
     said = verdict(row, alone["simulator"], doubt)
     lines = [line for line in lines if line != doubt.copied]
     said = failed + said if said else mixed or not_reached(folder) or "No frame of it has a result." * (not good)
@@ -88,6 +91,7 @@ def _said(alone: Mapping[Any, Any], folder: Path, lines: Sequence[str], copied: 
     return {
         "badge": badge(status, status == "ok", row, doubt),
         "verdict": said + aside,
+        "closed": closed,
         "warnings": [*lines[:_MOST_WARNINGS], *[f"{more} on the pages of its cases"] * (rest > 0)],
     }
 

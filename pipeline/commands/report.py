@@ -66,8 +66,9 @@ def main(args: argparse.Namespace) -> int:
 
         say(f"summary: {write_pdf(args.out)}")
     whole = _all_there(args.out, found if args.overview else ())
+    sys.stderr.writelines(f"{line}\n" for line in totals.closed)
     say(last_line(totals, page))
-    return 0 if totals.all_ok and others_ok and drawn and whole else 1
+    return 0 if totals.all_ok and not totals.closed and others_ok and drawn and whole else 1
 
 
 def _all_there(out: Path, found: Sequence["Result"], name: str = "") -> bool:
@@ -148,7 +149,9 @@ def _others(out: Path, *, embed: bool) -> bool:
     folders = folders_in(out)
     good = []
     for name, folder in [*folders.items()][1:]:
-        good += [aggregate(folder).all_ok, _all_there(folder, found_results(folder), f"{name}: ")]
+        totals = aggregate(folder)
+        sys.stderr.writelines(f"{name}: {line}\n" for line in totals.closed)
+        good += [totals.all_ok, not totals.closed, _all_there(folder, found_results(folder), f"{name}: ")]
         say(f"{name}: report: {render_index(folder, embed)}")
     for line in side_by_side(out, folders, embed) if folders else ():
         say(line)

@@ -5,6 +5,7 @@ import math
 import os
 import re
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -65,11 +66,11 @@ def main(args: argparse.Namespace) -> int:
 def _run(args: argparse.Namespace, gates: "Sequence[Gate]") -> int:
     from pipeline.run.aggregate import write_tests
     from pipeline.run.batch import require_cluster
-    from pipeline.run.gate import held, open_lines
     from pipeline.run.last_words import last_line
     from pipeline.run.launch import intention, launch
     from pipeline.run.results import found_results
     from pipeline.study.plausible import doubts
+    from reports.gates import open_in
 
     plan = _plan(args)
     if not plan.cases:
@@ -77,7 +78,7 @@ def _run(args: argparse.Namespace, gates: "Sequence[Gate]") -> int:
             write_tests(args.junit, {}, {})  # a build server expects the file
         say(_nothing(args.shard, plan))
         return 0
-    plan = _sound(plan, args.skip_bad)
+    plan = replace(_sound(plan, args.skip_bad), gates=tuple(gates))
     if args.dry_run:
         doubtful = doubts(plan.cases, plan.template.settings.config)
         for line in [*(f"warning: {text}" for text in doubtful), *intention(plan)]:
@@ -85,15 +86,13 @@ def _run(args: argparse.Namespace, gates: "Sequence[Gate]") -> int:
         return 0
     require_cluster(plan.address)  # before OUT is claimed
     totals, index = launch(plan)
-    judged = held(gates, plan.out, totals.pooled)
-    closed = [why for why in judged.values() if why]
     if args.junit:
-        write_tests(args.junit, {"": found_results(plan.out)}, judged)
-    _tell(plan, totals, closed)
-    for line in () if plan.template.quiet else open_lines(gates, judged, totals.pooled):
+        write_tests(args.junit, {"": found_results(plan.out)}, totals.gates)
+    _tell(plan, totals)
+    for line in () if plan.template.quiet else open_in(plan.out):
         say(line)
     say(last_line(totals, index))
-    return 0 if totals.all_ok and not closed else 1
+    return 0 if totals.all_ok and not totals.closed else 1
 
 
 def _sound(plan: "Plan", skip_bad: bool) -> "Plan":
@@ -121,13 +120,13 @@ def _sound(plan: "Plan", skip_bad: bool) -> "Plan":
     return plan
 
 
-def _tell(plan: "Plan", totals: "Totals", closed: "Sequence[str]") -> None:
+def _tell(plan: "Plan", totals: "Totals") -> None:
     """What went wrong, on stderr, and what to bear in mind; warnings are not among the result, which -q prints."""
     from pipeline.run.last_words import failure_lines
     from reports.verdict import remarks
     from reports.what_next import warned
 
-    sys.stderr.writelines(f"{line}\n" for line in (*failure_lines(plan), *closed))
+    sys.stderr.writelines(f"{line}\n" for line in (*failure_lines(plan), *totals.closed))
     aside(warned(plan.out), quiet=plan.template.quiet)
     for text in remarks(totals.pooled):
         say(f"warning: {text}")

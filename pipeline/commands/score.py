@@ -12,7 +12,6 @@ from pipeline.commands.given import add_calibrated, file_of
 
 if TYPE_CHECKING:
     from pipeline.run.aggregate import Totals
-    from pipeline.run.gate import Gate
     from pipeline.run.launch import Plan
 
 HELP = "judge other simulators' wires by the same pipeline, side by side with the solver's own"
@@ -51,13 +50,14 @@ def main(args: argparse.Namespace) -> int:
     from pipeline.status import InputError
     from pipeline.study.check import check
     from pipeline.study.others import named
+    from reports.gates import open_in
     from reports.inside import misleading_links
     from reports.schema import OURS, SIMULATORS, WHERE
     from reports.simulators import PAGE
     from reports.what_next import warned
 
     gates = [gate(text, [*named(args.curves), OURS]) for text in args.fail_if]
-    plans = _plans(args)
+    plans = {name: replace(p, gates=tuple(g for g in gates if g.asks(name))) for name, p in _plans(args).items()}
     found = {name: check(plan.cases, plan.template.settings.config) for name, plan in plans.items()}
     theirs = [f"{name}: {text}" for name, of in found.items() for text in of if text not in found[OURS]]
     problems = [*misleading_links(args.out), *found[OURS], *theirs]
@@ -71,30 +71,25 @@ def main(args: argparse.Namespace) -> int:
     aside(warnings, quiet=args.quiet)
     for line in side_by_side(args.out, {name: plan.out for name, plan in plans.items()}, args.embed):
         say(line)
-    closed, opened = _asked(gates, plans, totals, args.junit)
-    for line in () if args.quiet else opened:
+    if args.junit:
+        _write_junit(args.junit, plans, totals)
+    for line in () if args.quiet else [f"{name}: {line}" for name, plan in plans.items() for line in open_in(plan.out)]:
         say(line)
-    sys.stderr.writelines(f"{line}\n" for line in closed)
-    return 0 if all(one.all_ok for one in totals.values()) and not closed else 1
+    sys.stderr.writelines(f"{name}: {why}\n" for name, one in totals.items() for why in one.closed)
+    return 0 if all(one.all_ok and not one.closed for one in totals.values()) else 1
 
 
-def _asked(
-    gates: "Sequence[Gate]", plans: "Mapping[str, Plan]", totals: "Mapping[str, Totals]", junit: Path | None
-) -> tuple[list[str], list[str]]:
-    """Why simulators must not pass, and which gates are open; told in the JUnit summary, too, where one is asked."""
+def _write_junit(path: Path, plans: "Mapping[str, Plan]", totals: "Mapping[str, Totals]") -> None:
+    """The frames of all simulators, and the gates of each."""
     from pipeline.run.aggregate import write_tests
-    from pipeline.run.gate import held, open_lines
     from pipeline.run.results import found_results
 
-    judged: dict[str, str] = {}
-    opened: list[str] = []
-    for name, plan in plans.items():
-        own = held(gates, plan.out, totals[name].pooled, name)
-        opened += [f"{name}: {line}" for line in open_lines(gates, own, totals[name].pooled)]
-        judged |= {f"{name}: {asked}": f"{name}: {why}" * bool(why) for asked, why in own.items()}
-    if junit:
-        write_tests(junit, {f"{name}/": found_results(plan.out) for name, plan in plans.items()}, judged)
-    return [why for why in judged.values() if why], opened
+    gates = {
+        f"{name}: {asked}": f"{name}: {why}" * bool(why)
+        for name, one in totals.items()
+        for asked, why in one.gates.items()
+    }
+    write_tests(path, {f"{name}/": found_results(plan.out) for name, plan in plans.items()}, gates)
 
 
 def _judged(plans: "Mapping[str, Plan]", quiet: bool) -> "dict[str, Totals]":

@@ -14,12 +14,14 @@ import pandas as pd
 
 from pipeline.run.another import copies, with_another
 from pipeline.run.exchanged import exchanged
+from pipeline.run.gate import CLOSED, parsed
 from pipeline.run.kin import told_of_kin
 from pipeline.run.overall import Found, found_cases, frames_of, overall, shared_scans, strangers, validation
 from pipeline.run.results import Result, write_json
 from reports import tables
 from reports.case_files import GOOD, not_reached
-from reports.doubts import AMONG, doubted
+from reports.doubts import AMONG, copied_from_traces, doubted, warnings_in
+from reports.gates import GATES, asked_of
 from reports.junit import Outcome, write_junit
 from reports.origin import why_not_pooled
 from reports.schema import FAILURES, OVERALL_FILE, SUMMARY, TIMINGS
@@ -31,6 +33,7 @@ class Totals:
     """The numbers of the last line. Errors are those of all points of the frames that are pooled, as in overall.csv.
 
     unscored : why there are no errors.     mixed : whether the reason is that settings or manifests differ.
+    gates : by each condition that was asked, why the run must not pass, empty where it may.
     sweep_lost : cases that crashed at a point of a sweep; they are not counted in ``cases``.
     frames_fitted : scans that a roll was fitted on; they are not counted in ``frames``.
     """
@@ -45,6 +48,7 @@ class Totals:
     pooled: Mapping[str, Any] = field(default_factory=dict)
     unscored: str = ""
     mixed: bool = False
+    gates: Mapping[str, str] = field(default_factory=dict)
     sweep_lost: int = 0
     frames_fitted: int = 0
 
@@ -52,6 +56,11 @@ class Totals:
     def all_ok(self) -> bool:
         """Whether every case is ok: decides the exit code and the printed counts alike."""
         return self.cases > 0 and self.cases_ok == self.cases and not (self.mixed or self.sweep_lost)
+
+    @property
+    def closed(self) -> list[str]:
+        """A sentence for each gate that is closed."""
+        return [why for why in self.gates.values() if why]
 
 
 def aggregate(out: Path, run_info: dict[str, Any] | None = None, name: str = "run.json") -> Totals:
@@ -88,6 +97,7 @@ def aggregate(out: Path, run_info: dict[str, Any] | None = None, name: str = "ru
         whole,
         mixed or unscored((result.role, result.status) for result in found) or not_reached(out),
         bool(mixed),
+        _judged(out, whole),
         frames_fitted=sum(row.get("frames_fitted") or 0 for row in rows),
     )
 
@@ -104,6 +114,22 @@ def _keep_what_is_seen(out: Path, found: Sequence[Result], among: Sequence[Found
     (out / AMONG).unlink(missing_ok=True)
     if assumed or doubts:
         write_json(out / AMONG, {"assumptions": assumed, "doubts": doubts})
+
+
+def _judged(out: Path, overall: Mapping[str, Any]) -> dict[str, str]:
+    """By what the runs into ``out`` asked, why it must not pass, empty where it may; written for its page, too.
+
+    Errors of wires that were made from the traces open no gate. overall : the row of the run.
+    """
+    asked = [parsed(text) for text in asked_of(out)]
+    (out / GATES).unlink(missing_ok=True)
+    if not asked:
+        return {}
+    copied = copied_from_traces(warnings_in(out))  # reads the results of all cases
+    told = {g.asked: f"{CLOSED}: {g.asked}: {copied}" if copied else g.closed(overall) for g in asked}
+    opened = [f"gate open: {g.asked}: {g.column} is {float(overall[g.column]):.4g}" for g in asked if not told[g.asked]]
+    write_json(out / GATES, {"closed": [why for why in told.values() if why], "open": opened})
+    return told
 
 
 def _times(out: Path, found: Sequence[Result]) -> tuple[pd.DataFrame, float]:
@@ -123,8 +149,7 @@ def _times(out: Path, found: Sequence[Result]) -> tuple[pd.DataFrame, float]:
 def write_tests(path: Path, found: Mapping[str, Sequence[Result]], gates: Mapping[str, str]) -> None:
     """Write a JUnit summary: a suite per case, a test per frame (one test for a case without frames), a suite of gates.
 
-    found : the cases by what their suites' names begin with.     gates : each condition that was asked for, and why it
-    failed, empty where it passed.
+    found : the cases by what their suites' names begin with.     gates : as in ``Totals``.
     """
     suites = [
         (f"{whose}{result.case}", [_outcome(frame) for frame in result.frames or [_whole(result)]])

@@ -5,13 +5,13 @@ import operator
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from pipeline.status import UsageError, did_you_mean
 from reports.schema import OURS, OVERALL_FILE, SUMMARY
 from reports.texts import NUMBER
 
+CLOSED = "gate closed"
 RELATIONS = {"<=": operator.le, ">=": operator.ge, "<": operator.lt, ">": operator.gt}
 WRITTEN = re.compile(rf"\s*(?:([\w.-]+):)?\s*(\w+)\s*({'|'.join(RELATIONS)})\s*({NUMBER})\s*")
 
@@ -29,9 +29,14 @@ class Gate:
     of: str = ""
 
     @property
+    def text(self) -> str:
+        """The condition as it was typed."""
+        return f"{self.of}{':' * bool(self.of)}{self.column}{self.relation}{self.limit:.12g}"
+
+    @property
     def asked(self) -> str:
         """The option as it was typed."""
-        return f"--fail-if {self.of}{':' * bool(self.of)}{self.column}{self.relation}{self.limit:g}"
+        return f"--fail-if {self.text}"
 
     def asks(self, simulator: str) -> bool:
         """Whether this simulator's wires are asked; without a name they are the run's only ones."""
@@ -41,35 +46,16 @@ class Gate:
         """Why a run with this row of overall.csv must not pass; empty where it may."""
         if not overall:
             why = f"{OVERALL_FILE} has no row, as no case was scored; it cannot be shown to hold"
-            return f"gate closed: {self.asked}: {why}"
+            return f"{CLOSED}: {self.asked}: {why}"
         found = overall.get(self.column)
         value = float("nan") if found is None else float(found)
         if math.isnan(value):
             interval = str(overall.get("interval", ""))
             end = self.column.endswith(("_low_mm", "_high_mm", "_low", "_high"))
             why = f": {interval}" * (end and ("withheld" in interval or self.column in interval))
-            return f"gate closed: {self.asked}: {OVERALL_FILE} has no {self.column}{why}; it cannot be shown to hold"
+            return f"{CLOSED}: {self.asked}: {OVERALL_FILE} has no {self.column}{why}; it cannot be shown to hold"
         passed = not RELATIONS[self.relation](value, self.limit)
-        return "" if passed else f"gate closed: {self.asked}: {self.column} is {value:.4g}"
-
-
-def held(gates: Sequence[Gate], out: Path, overall: Mapping[str, Any], simulator: str = "") -> dict[str, str]:
-    """By what was asked, why a run must not pass, empty where it may.
-
-    Errors of wires that were made from the traces open no gate. overall : the row of the run into ``out``.
-    simulator : whose wires they are, in a score.
-    """
-    from reports.doubts import copied_from_traces, warnings_in  # half a second, for a gate that may be refused
-
-    asked = [gate for gate in gates if gate.asks(simulator)]
-    copied = copied_from_traces(warnings_in(out)) if asked else ""  # reads the results of all cases
-    return {g.asked: f"gate closed: {g.asked}: {copied}" if copied else g.closed(overall) for g in asked}
-
-
-def open_lines(gates: Sequence[Gate], judged: Mapping[str, str], overall: Mapping[str, Any]) -> list[str]:
-    """What is said of the gates that were asked and are open. judged : of ``held``."""
-    passed = [gate for gate in gates if judged.get(gate.asked) == ""]
-    return [f"gate open: {gate.asked}: {gate.column} is {float(overall[gate.column]):.4g}" for gate in passed]
+        return "" if passed else f"{CLOSED}: {self.asked}: {self.column} is {value:.4g}"
 
 
 def gate(text: str, simulators: Sequence[str] = ()) -> Gate:
@@ -77,6 +63,15 @@ def gate(text: str, simulators: Sequence[str] = ()) -> Gate:
 
     simulators : those of a score, one of which may be named before it: ``mine:column>number``.
     """
+    found = parsed(text)
+    if found.of and found.of not in simulators:
+        do = did_you_mean(found.of, simulators) if simulators else "only score has several; write the condition alone"
+        raise UsageError([f"--fail-if {text!r}: no simulator {found.of!r}; {do}"])
+    return found
+
+
+def parsed(text: str) -> Gate:
+    """The condition, of whichever simulator; raises as ``gate`` does."""
     found = WRITTEN.fullmatch(text)
     name, column, relation, limit = found.groups() if found else ("", "", "", "nan")
     number, names = float(limit), [one.name for one in SUMMARY if one.kind != "text"]
@@ -86,7 +81,4 @@ def gate(text: str, simulators: Sequence[str] = ()) -> Gate:
         raise UsageError([f"--fail-if {text!r}: {do}{unquoted}"])
     if column not in names:
         raise UsageError([f"--fail-if {text!r}: no number {column!r} in {OVERALL_FILE}; {did_you_mean(column, names)}"])
-    if name and name not in simulators:
-        known = did_you_mean(name, simulators) if simulators else "only score has several; write the condition alone"
-        raise UsageError([f"--fail-if {text!r}: no simulator {name!r}; {known}"])
     return Gate(column, relation, number, name or "")

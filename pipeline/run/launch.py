@@ -20,6 +20,7 @@ from pipeline.run.aggregate import Totals, aggregate
 from pipeline.run.batch import run_all
 from pipeline.run.cache import Store, forget_lumen
 from pipeline.run.case import Job, clear, each_on, finished, run_case
+from pipeline.run.gate import Gate
 from pipeline.run.hashing import file_hash
 from pipeline.run.inputs import stated
 from pipeline.run.log import last_stage
@@ -38,11 +39,13 @@ from pipeline.study.settings import to_toml
 from reports.atomic import WriteError, remove_leftovers, write_text, writing
 from reports.case_files import counted, left_over, provenance_of
 from reports.doubts import AMONG
+from reports.gates import GATES
 from reports.records import read_json
 from reports.run_page import render_index
 from reports.schema import FAILURES, OVERALL_FILE, SUMMARY, SWEEP, TIMINGS
 
-OVER_ALL = SUMMARY.file, OVERALL_FILE, FAILURES.file, TIMINGS.file, SWEEP.file, AMONG, "index.html", "summary.pdf"
+TABLES = SUMMARY.file, OVERALL_FILE, FAILURES.file, TIMINGS.file, SWEEP.file
+OVER_ALL = *TABLES, AMONG, GATES, "index.html", "summary.pdf"
 """Files over all cases. They go before the first case is computed: a run that is ended would leave those of an earlier
 one, all ok, beside cases of its own."""
 
@@ -55,7 +58,7 @@ class Plan:
     shard : I/N where only a part of the cases is run, else empty.     assumptions : what was inferred.
     left_out : ids of the manifest's cases that --only does not name.
     inferred_from : the folder of scans that the manifest was inferred from; None where there is a manifest.
-    refused : cases that are not computed, with what is wrong with each.
+    refused : cases that are not computed, with what is wrong with each.     gates : conditions on the whole run.
     """
 
     manifest: Manifest
@@ -70,6 +73,7 @@ class Plan:
     left_out: tuple[str, ...] = ()
     inferred_from: Path | None = None
     refused: tuple[tuple[Case, str], ...] = ()
+    gates: tuple[Gate, ...] = ()
 
     @property
     def out(self) -> Path:
@@ -154,6 +158,7 @@ def launch(plan: Plan) -> tuple[Totals, Path]:
     info |= {"sweep": heads, "swept": sorted(plan.ids) if heads else [], "until": plan.template.until}
     info |= {"stated": {case.id: stated(case) for case in plan.manifest.cases}}
     info |= {"planned": [case.id for case in plan.manifest.cases], "doubts": continued(plan.manifest.cases)}
+    info |= {"fail_if": [gate.text for gate in plan.gates]}
     name = f"run.{plan.shard.replace('/', '-')}.json" if plan.shard else "run.json"
     info |= {"left_out": _never_asked(out / name, plan.left_out), "config": settings.as_dict()}
     try:

@@ -22,7 +22,7 @@ from pipeline.compare import point_to_curve
 from pipeline.status import InputError, StageError
 from solver import Catheter, Grid, GuideWire, Insertion, Insertions, Snap, Solution, Status, VesselWall, relax
 
-from .results import Results, read_results, read_run, with_gates
+from .results import Results, read_results, read_run
 
 __all__ = [
     "Catheter",
@@ -95,7 +95,7 @@ def run(
     points = [f"{name}={','.join(map(str, values))}" for name, values in (sweep or {}).items()]
     gates = [fail_if] if isinstance(fail_if, str) else list(fail_if)
     _carried_out("run", manifest, out=out, settings=settings, jobs=jobs, sweep=points, fail_if=gates, **more)
-    return read_run(Path(out), gates)
+    return read_run(Path(out))
 
 
 def score(
@@ -117,7 +117,7 @@ def score(
     named = [f"{name}={place}" for name, place in curves.items()] if isinstance(curves, Mapping) else curves
     curves = [named] if isinstance(named, (str, Path)) else list(named)
     _carried_out("score", manifest, out=out, curves=curves, fail_if=gates, **more)
-    return with_gates(read_results(out), gates)
+    return read_results(out)
 
 
 def calibrate(manifest: Place, out: Place, **more: bool | Settings) -> Path:

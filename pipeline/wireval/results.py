@@ -10,11 +10,11 @@ from typing import Any, NoReturn
 import numpy as np
 import pandas as pd
 
-from pipeline.run.gate import gate, held
 from pipeline.run.results import Result, found_results
 from pipeline.status import InputError, did_you_mean
 from reports import tables
 from reports.case_files import CaseFiles, amiss, find_cases, listed, not_run, read_case
+from reports.gates import closed_in
 from reports.origin import why_not_pooled
 from reports.schema import ERRORS, FAILURES, OVERALL_FILE, POINTS, SIMULATORS, SUMMARY, SWEEP, WHERE, Table
 from reports.simulators import folders_in
@@ -115,6 +115,12 @@ def read_results(out: str | Path) -> Results:
     return replace(found, other_tables=others)
 
 
+def _closed(out: Path) -> tuple[str, ...]:
+    """A sentence for each closed gate of a run; of a score, of every simulator that was asked."""
+    of = {f"{name}: ": folder for name, folder in folders_in(out).items()} or {"": out}
+    return tuple(f"{whose}{why}" for whose, folder in of.items() for why in closed_in(folder))
+
+
 def _tables_of_others(found: Results, results: Sequence[Result]) -> str:
     """That tables over all cases are not of these cases, as those of one shard of several; empty where they are."""
     rows = {str(row["case"]): row for row in found.summary.to_dict("records")}
@@ -139,29 +145,9 @@ def _alike(row: Mapping[Any, Any], other: Mapping[str, Any]) -> bool:
     return bool(np.allclose(one, two, rtol=1e-6, atol=0.0, equal_nan=True))
 
 
-def read_run(out: Path, gates: Sequence[str] = ()) -> Results:
-    """What a run has just left: nothing, in empty tables, where it was a shard that got none of the cases.
-
-    gates : its ``fail_if``.
-    """
-    return with_gates(read_results(out) if find_cases(out) else _results(out, {}), gates)
-
-
-def with_gates(found: Results, gates: Sequence[str]) -> Results:
-    """The results with a sentence for each ``fail_if`` that holds: of a score, of every simulator that is asked."""
-    simulators = folders_in(found.out)
-    asked = [gate(text, [*simulators]) for text in gates]
-    judged = {
-        f"{name}: " if name else "": held(asked, folder, _pooled(folder), name)
-        for name, folder in (simulators or {"": found.out}).items()
-    }
-    return replace(found, closed=tuple(f"{whose}{why}" for whose, own in judged.items() for why in own.values() if why))
-
-
-def _pooled(out: Path) -> dict[str, Any]:
-    """The row of overall.csv, without what is missing there."""
-    known = tables.read_if_there(out / OVERALL_FILE, SUMMARY).head(1).dropna(axis=1).to_dict("records")
-    return {str(name): value for row in known for name, value in row.items()}
+def read_run(out: Path) -> Results:
+    """What a run has just left: nothing, in empty tables, where it was a shard that got none of the cases."""
+    return read_results(out) if find_cases(out) else _results(out, {})
 
 
 def _results(out: Path, cases: dict[str, CaseFiles], damaged: tuple[str, ...] = ()) -> Results:
@@ -174,7 +160,7 @@ def _results(out: Path, cases: dict[str, CaseFiles], damaged: tuple[str, ...] = 
     whole = table(SUMMARY, OVERALL_FILE)
     errors = _of_all({name: case.errors for name, case in cases.items() if name not in damaged}, ERRORS)
     beside = table(FAILURES), table(SWEEP), table(SIMULATORS), table(WHERE)
-    return Results(out, table(SUMMARY), whole, errors, *beside, Cases(cases), damaged=damaged)
+    return Results(out, table(SUMMARY), whole, errors, *beside, Cases(cases), _closed(out), damaged)
 
 
 def _of_all(by_case: dict[str, pd.DataFrame], kind: Table) -> pd.DataFrame:

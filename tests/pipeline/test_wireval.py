@@ -74,6 +74,15 @@ def test_a_run_gives_frames(study: Path, tmp_path: Path) -> None:
     assert not again.ok, "a closed gate was seen on the terminal alone"
     assert len(again.closed) == 1
     assert "--fail-if rms_mm>0.001" in again.closed[0]
+    assert wireval.read_results(tmp_path / "out").closed == again.closed, "nor did a later reader see it"
+    page = (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
+    assert "gate closed</span>" in page, "the page was green"
+    assert "Gate closed: --fail-if rms_mm&gt;0.001: rms_mm is" in page
+    assert "Gate open: --fail-if rms_mm&gt;9: rms_mm is" in page
+    assert main(["report", str(tmp_path / "out"), "--overview"]) == 1
+    open_again = wireval.run(study, tmp_path / "out", resume=True, **kept)
+    assert open_again.ok
+    assert not (tmp_path / "out" / "gates.json").exists()
 
 
 def test_verbs_are_called_as_they_are_typed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -143,5 +152,11 @@ def test_a_gate_that_any_simulator_closes_is_told(tmp_path: Path) -> None:
     assert not scored.ok
     (why,) = scored.closed
     assert why.startswith("far: gate closed: --fail-if rms_mm>0.6: rms_mm is 0.")
+    pages = {
+        page: (tmp_path / "scored" / page).read_text(encoding="utf-8") for page in ("index.html", "simulators.html")
+    }
+    assert "ate closed" not in pages["index.html"], "near's"
+    assert pages["simulators.html"].count("Gate closed: --fail-if rms_mm&gt;0.6") == 1
+    assert main(["report", str(tmp_path / "scored"), "--overview"]) == 1
     assert set(scored.simulators["simulator"]) == {"near", "far", "wireval"}
     assert len(scored.where)

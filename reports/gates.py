@@ -1,0 +1,25 @@
+"""What was asked of a whole run (``--fail-if``) and the answers, as ``gates.json`` has them for pages and notebooks."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from reports.case_files import runs_in
+from reports.records import read_json
+
+GATES = "gates.json"
+"""A run and ``wireval report`` write it anew, from the numbers that stand in overall.csv then."""
+
+
+def asked_of(out_dir: Path) -> list[str]:
+    """The conditions that runs into a folder were given, as typed, each once."""
+    return list(dict.fromkeys(text for run in runs_in(out_dir) for text in run.get("fail_if", ())))
+
+
+def closed_in(out_dir: Path) -> Sequence[str]:
+    """A sentence for each gate of a run, or of one simulator of a score, that is closed."""
+    return list(read_json(out_dir / GATES).get("closed", ()))
+
+
+def open_in(out_dir: Path) -> Sequence[str]:
+    """A sentence for each that is open."""
+    return list(read_json(out_dir / GATES).get("open", ()))
