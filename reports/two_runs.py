@@ -48,7 +48,7 @@ def _words(text: str) -> str:
     return re.sub(r"# (frame|place|case|point|insertion)s?\b", r"# \1", re.sub(r"[-+]?\d[\d.e+-]*", "#", text))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Verdict:
     """What became of a second run against a first one.
 
@@ -71,6 +71,10 @@ class Verdict:
     alike: str = ""
     warned: Sequence[Mapping[str, str]] = ()
     void: str = ""
+
+    def __repr__(self) -> str:
+        """What a prompt shows: as on a terminal."""
+        return "\n".join(self.lines())
 
     @property
     def closed(self) -> bool:

@@ -34,7 +34,7 @@ def main(args: argparse.Namespace) -> int:
         raise UsageError(problems)
     if path.exists():
         raise UsageError([f"{path}: is there already; correct it, or write another with --to FILE"])
-    text, seen, assumed = inferred(args, beside=args.to is None)
+    text, seen, assumed = inferred(args, beside=path.parent.resolve() == args.manifest.resolve())
     head = (
         "# correct what is `assumed` below, and take each line out that you have confirmed: pages repeat what is left"
     )

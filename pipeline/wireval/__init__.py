@@ -6,9 +6,9 @@
     results = wireval.run("study/manifest.toml", "out", jobs=2)
     results.errors.plot(x="insertion_mm", y="rms_mm")
 
-Here is no code of its own: ``check``, ``run``, ``score`` and ``calibrate`` are the verbs as typed, everything else is
-re-exported; other verbs (synth, diff, report, ...) are on the command line alone. What cannot be used raises
-``InputError`` (or ``StageError``, where a scan shows nothing to go by) with the sentences of the terminal.
+Here is no code of its own: ``synth``, ``check``, ``run``, ``score``, ``calibrate`` and ``diff`` are the verbs as
+typed, everything else is re-exported; other verbs (report, bench, ...) are on the command line alone. What cannot be
+used raises ``InputError`` (or ``StageError``, where a scan shows nothing to go by) with the sentences of the terminal.
 """
 
 import json
@@ -19,7 +19,9 @@ from pathlib import Path
 
 from pipeline.cli import BAD_INPUT, carried_out, parsed
 from pipeline.compare import point_to_curve
+from pipeline.run.compared import compared
 from pipeline.status import InputError, StageError
+from reports.two_runs import Verdict
 from solver import Catheter, Grid, GuideWire, Insertion, Insertions, Snap, Solution, Status, VesselWall, relax
 
 from .results import Results, read_results, read_run
@@ -36,14 +38,17 @@ __all__ = [
     "Solution",
     "StageError",
     "Status",
+    "Verdict",
     "VesselWall",
     "calibrate",
     "check",
+    "diff",
     "point_to_curve",
     "read_results",
     "relax",
     "run",
     "score",
+    "synth",
 ]
 
 
@@ -55,6 +60,12 @@ def __dir__() -> list[str]:
 Place = str | Path
 Settings = Mapping[str, bool | float | str | Sequence[object]]
 """``{"solver.segment_mm": 0.5}``: what --set takes, by table.key; `wireval settings` lists them."""
+
+
+def synth(scene: str, out: Place, **more: bool | float | str) -> Path:
+    """A study with truth, as files; its manifest. more : options of ``wireval synth``, as ``frames=8``, ``seed=3``."""
+    _carried_out("synth", scene, out=out, **more)
+    return Path(out) / "manifest.toml"
 
 
 def check(manifest: Place, *, settings: Settings | None = None) -> list[str]:
@@ -124,6 +135,17 @@ def calibrate(manifest: Place, out: Place, **more: bool | Settings) -> Path:
     """Parameters from the cases whose role is calibration: the file that ``run`` takes. more : as for ``score``."""
     _carried_out("calibrate", manifest, out=out, **more)
     return Path(out) / "parameters.toml"
+
+
+def diff(first: Place, second: Place, *, tolerance: Place | None = None) -> Verdict:
+    """Whether a second run, or score, became worse than a first one; InputError where they cannot be compared.
+
+    tolerance : TOML, column = allowed increase; a default ships.
+    """
+    try:
+        return compared(Path(first), Path(second), None if tolerance is None else Path(tolerance))
+    except (ValueError, OSError) as error:
+        raise InputError([str(error)]) from None
 
 
 def _carried_out(verb: str, manifest: Place, settings: object = None, **options: object) -> None:

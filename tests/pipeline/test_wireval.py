@@ -17,9 +17,7 @@ from tests.pipeline.known_study import run_known, write_csv
 
 @pytest.fixture(scope="module")
 def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("scans")
-    assert main(["synth", "straight", "-o", str(folder), "--size", "72", "--frames", "2"]) == 0
-    return folder
+    return wireval.synth("straight", tmp_path_factory.mktemp("scans"), size=72, frames=2).parent
 
 
 def test_everything_that_is_promised_is_there_and_says_what_it_is() -> None:
@@ -80,6 +78,11 @@ def test_a_run_gives_frames(study: Path, tmp_path: Path) -> None:
     assert "Gate closed: --fail-if rms_mm&gt;0.001: rms_mm is" in page
     assert "Gate open: --fail-if rms_mm&gt;9: rms_mm is" in page
     assert main(["report", str(tmp_path / "out"), "--overview"]) == 1
+    verdict = wireval.diff(tmp_path / "out", tmp_path / "out")
+    assert (verdict.closed, verdict.word) == (False, "not worse")
+    assert repr(verdict).endswith("exit 0, the gate stays open")
+    with pytest.raises(wireval.InputError, match="no such folder"):
+        wireval.diff(tmp_path / "out", tmp_path / "none")
     open_again = wireval.run(study, tmp_path / "out", resume=True, **kept)
     assert open_again.ok
     assert not (tmp_path / "out" / "gates.json").exists()
