@@ -56,7 +56,10 @@ def _at_the_floor(statistics: Mapping[str, Any]) -> str:
     floor = FLOOR_SIGMAS * _number(statistics.get("trace_sigma_mm"))
     if not _number(statistics.get("rms_mm")) <= floor:
         return ""
-    return f" A perfect wire would lie {number(floor)} mm from these traces: nothing less tells one wire from another."
+    return (
+        f" By the traces' own standard deviation a perfect wire would lie {number(floor)} mm from them: what lies "
+        "nearer has their errors, and is not for that the better wire."
+    )
 
 
 BEYOND_INPUTS = 0.1

@@ -62,20 +62,25 @@ def _squares(tried: Array, others: Array) -> Array:
     return np.asarray((np.sum(y**2, axis=1) - np.sum(across * cho_solve(cho_factor(inner), across), axis=0)) / SHRUNK)
 
 
-def rank_of_ends(frames: Sequence[Array]) -> float:
+def rank_of_ends(frames: Sequence[Array], per_lumen: int = 1) -> float:
     """Rank (0, 1] of the real insertion among the members, by ``coefficients`` of each frame.
 
-    1 / (members + 1) where it is rarer than every one of them. NaN without frames, and with fewer than FEWEST members
-    that came to rest in all of them.
+    per_lumen : how many members, one after the other, share a lumen (``inputs.drawn``). None is judged by those of its
+    own, as the real one has none: where the lumen is most of what is uncertain, right models were called rare in 18 of
+    40 cases, not 2.     1 / (members + 1) where it is rarer than every one of them. NaN without frames, and with fewer
+    than FEWEST members that came to rest in all of them.
     """
     if not frames:
         return float("nan")
     whole = np.concatenate(list(frames), axis=1)
     members, real = whole[:-1], whole[-1]
-    members = members[np.isfinite(members).all(axis=1)]
+    at_rest = np.isfinite(members).all(axis=1)
+    members, lumen = members[at_rest], np.arange(len(members))[at_rest] // per_lumen
     if len(members) < FEWEST or not np.isfinite(real).all():
         return float("nan")
     # as many others for the real one as for each member
-    pairs = [_squares(np.stack([one, real]), np.delete(members, i, axis=0)) for i, one in enumerate(members)]
-    each, own = np.array(pairs).T
+    each, own = np.zeros(len(members)), np.zeros(len(members))
+    for one in np.unique(lumen):
+        mine = lumen == one
+        *each[mine], own[mine] = _squares(np.concatenate([members[mine], real[None]]), members[~mine])
     return float((1 + np.sum(each >= own.mean())) / (len(each) + 1))

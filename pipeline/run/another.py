@@ -4,7 +4,7 @@ It needs the traces of all cases, so it is computed after them and stands in ove
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import replace
 from pathlib import Path
 
@@ -28,6 +28,8 @@ RESCANNED = "tell no more than one insertion that was scanned again"
 NEAREST_MM = 2.0
 """How far off the nearest depth may be, at the least; else half as far as one of its frames is from the next: a trace
 that is farther off stands in for one that is missing, and what is lost would make the wire look better."""
+ANOTHER_ROLL_DEG = 0.1
+"""Rolls that differ by less are one: nobody reads them to that, and 0.02 degrees made three insertions of one."""
 STEP_MM = 0.5
 MOST_OTHERS = 24
 """Most traces in a guess, those of the nearest depths: with all of 500 cases in one phantom it would take ten minutes,
@@ -89,11 +91,15 @@ def copies(found: Sequence[Found]) -> list[str]:
 def _stated_apart(both: tuple[str, ...], found: Sequence[Found]) -> bool:
     """Whether two insertions are stated to be two: by groups of their own names, or by other rolls."""
     own = [[case for case in found if case.insertion == name] for name in both]
-    rolls = [
-        {round(frame.row.get("roll_deg") or 0.0, 3) for c in cases for frame in c.frames.values()} for cases in own
-    ]
+    rolls = [{frame.row.get("roll_deg") or 0.0 for c in cases for frame in c.frames.values()} for cases in own]
     grouped = [any(case.result.group != case.result.case for case in cases) for cases in own]
-    return all(grouped) or rolls[0] != rolls[1]
+    return all(grouped) or _apart_deg(*rolls) > ANOTHER_ROLL_DEG
+
+
+def _apart_deg(one: Set[float], other: Set[float]) -> float:
+    """The most by which a roll of either is off the nearest of the other, degrees."""
+    off = np.abs(np.remainder(np.subtract.outer(sorted(one), sorted(other)) + 180.0, 360.0) - 180.0)
+    return float(max(off.min(axis=0).max(), off.min(axis=1).max())) if off.size else 0.0
 
 
 def _together(apart: Mapping[tuple[str, ...], float]) -> list[tuple[list[str], float]]:

@@ -72,7 +72,8 @@ def _of_one(first: Path, second: Path, tolerance: Mapping[str, float]) -> Verdic
         nearer = f"but over all frames the errors are {paired.value:.3g} times those of the first run"
     caveat = "; ".join(filter(None, (otherwise, of_two_simulators(differs), unpaired, not_judged(tolerance), nearer)))
     warned = warned_of(first), warned_of(second)
-    told = told_alike(first, second), newly_warned(*warned), newly_void(*warned)
+    void = newly_void(*warned) or not_judged(tolerance) * (paired is not None and judged == "withheld")
+    told = told_alike(first, second), newly_warned(*warned), void
     return Verdict((first, second), differs, pooled, said, judged, frames, caveat, *told)
 
 

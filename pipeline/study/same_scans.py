@@ -81,7 +81,8 @@ def shared(cases: Sequence[Case]) -> list[str]:
 
 
 def continued(cases: Sequence[Case]) -> list[str]:
-    """A sentence for cases that look like one insertion cut in parts: stated alike, with depths that follow each other.
+    """A sentence for cases that look like one insertion cut in parts: stated alike, with depths that follow each other
+    or take turns.
 
     A second insertion with the same fixation begins at the front again, or is rolled otherwise.
     """
@@ -93,13 +94,24 @@ def continued(cases: Sequence[Case]) -> list[str]:
     said = []
     for group in alike.values():
         parts = sorted((min(case.insertion_mm or ()), max(case.insertion_mm or ()), case.id) for case in group)
-        if len(parts) > 1 and all(before[1] < after[0] for before, after in pairwise(parts)):
+        follow = all(before[1] < after[0] for before, after in pairwise(parts))
+        if len(parts) > 1 and (follow or _take_turns(group)):
             named = ", ".join(f"{name} ({first:g} to {last:g} mm)" for first, last, name in parts)
             said.append(
-                f"cases {named} have one reference, entry, wire and roll, and depths that follow each other: they "
-                f"count as {len(parts)} insertions; are they parts of one? then give them one group"
+                f"cases {named} have one reference, entry, wire and roll, and depths that "
+                f"{'follow each other' if follow else 'take turns'}: they count as {len(parts)} insertions; are they "
+                "parts of one? then give them one group, else each a group of its own name"
             )
     return said
+
+
+def _take_turns(cases: Sequence[Case]) -> bool:
+    """Whether the depths of cases, in order, are of one case after the other, round and round."""
+    depths = sorted((depth, number) for number, case in enumerate(cases) for depth in case.insertion_mm or ())
+    order, count = [number for _, number in depths], len(cases)
+    apart = all(before < after for (before, _), (after, _) in pairwise(depths))
+    several = len(depths) >= 3 * count  # twice round and less is chance
+    return apart and several and len(set(order[:count])) == count and order[count:] == order[: len(order) - count]
 
 
 def _place(source: Source) -> tuple[str, str]:

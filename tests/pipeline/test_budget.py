@@ -211,6 +211,21 @@ def test_ranks_of_right_insertions_are_even() -> None:
     assert np.mean(ranks) == pytest.approx(0.5, abs=0.06)
 
 
+def test_ranks_are_even_where_members_share_a_lumen() -> None:
+    """Two members have one lumen, nearly all of what is uncertain: of right ones a half were called rare."""
+    rng = np.random.default_rng(11)
+    size, whose = 40, np.append(np.repeat(np.arange(50), 2), 50)
+    ranks = []
+    for _ in range(40):
+        lumen, rest = (rng.normal(size=(size, n)) / np.sqrt(n) for n in (40, 8))
+        ends = np.sqrt(0.9) * rng.normal(size=(51, 40))[whose] @ lumen.T
+        ends = ends + np.sqrt(0.1) * rng.normal(size=(101, 8)) @ rest.T + 0.15 * rng.normal(size=(101, size))
+        ranks.append([rank_of_ends([ends], members) for members in (1, 2)])
+    rare = np.sum(np.array(ranks) <= 0.05, axis=0)
+    assert rare[1] <= 6, "2 expected; 3 standard deviations are 4"
+    assert rare[0] > 10, "as it was: the test can fail"
+
+
 def test_a_small_error_that_all_frames_share_is_found_together() -> None:
     """Within 2 standard deviations at every coefficient, and along what the inputs hardly move."""
     rng = np.random.default_rng(6)

@@ -174,17 +174,21 @@ def test_one_insertion_in_two_files_counts_once(tmp_path: Path, capsys: pytest.C
     assert pd.read_csv(tmp_path / "out" / "overall.csv")["insertions"].tolist() == [1]
 
 
-@pytest.mark.parametrize("shorter_mm", [0.0, 0.4])
-def test_a_clamp_of_the_same_curves_is_not_called_blind(tmp_path: Path, shorter_mm: float) -> None:
+@pytest.mark.parametrize(("shorter_mm", "group"), [(0.0, ""), (0.4, ""), (0.4, 'group = "A"\n')])
+def test_a_clamp_of_the_same_curves_is_not_called_blind(tmp_path: Path, shorter_mm: float, group: str) -> None:
+    """Nor that of other frames of the same insertion."""
     manifest = write_study(tmp_path)
     write_csv(tmp_path / "copies", [to_length(wire, arc_length(wire)[-1] - shorter_mm) for wire in WIRES])
     case = MANIFEST.partition("[[case]]")[2].replace('"bend"', '"copy"').replace("traces/", "copies/")
-    text = f'{MANIFEST}\n[[case]]{case}entry = "case:bend"\n'.replace("_sigma_mm = 0.0", "_sigma_mm = 0.1")
+    text = f'{MANIFEST}{group}\n[[case]]{case}{group}entry = "case:bend"\n'.replace(
+        "_sigma_mm = 0.0", "_sigma_mm = 0.1"
+    )
     manifest.write_text(text, encoding="utf-8")
     main(["run", str(manifest), "-o", str(tmp_path / "out"), "--until", "simulate", *QUICK])
     result = json.loads((tmp_path / "out/cases/copy/result.json").read_text(encoding="utf-8"))
-    same = shorter_mm == 0.0
-    assert any("it is not blind to them" in text for text in result["warnings"]) == same
+    same = shorter_mm == 0.0 or bool(group)
+    shares = "is of the same insertion (group 'A')" if group else "has scans of this case"
+    assert any(f"{shares}: it is not blind" in text for text in result["warnings"]) == same
     assert any("is blind to this case's scans" in text for text in result["assumptions"]) != same
 
 

@@ -305,11 +305,15 @@ def test_one_wire_that_was_scanned_again_is_told(out: Path) -> None:
     assert "they tell no more than one insertion that was scanned again, and count as 3" in said
     own = [replace(c, result=replace(c.result, group="own")) for c in alike]
     assert not copies(own), "who states groups says that each was pushed in anew"
-    rolled = [
-        replace(c, frames={n: f._replace(row={**f.row, "roll_deg": angle}) for n, f in c.frames.items()})
-        for c, angle in zip(alike, (20.0, 21.5, 23.0), strict=True)
-    ]
-    assert not copies(rolled), "as who states another roll: of six at random two were 1.5 degrees apart, and alike"
+
+    def rolled(*angles: float) -> list[Found]:
+        return [
+            replace(c, frames={n: f._replace(row={**f.row, "roll_deg": angle}) for n, f in c.frames.items()})
+            for c, angle in zip(alike, angles, strict=True)
+        ]
+
+    assert not copies(rolled(20, 21.5, 23)), "as who states another roll: of six two were 1.5 degrees apart, and alike"
+    assert len(copies(rolled(359.98, 0.0, 0.03))) == 1, "nobody reads a roll to that"
 
 
 def test_insertions_with_references_of_their_own_are_guesses_for_each_other(

@@ -332,6 +332,22 @@ def test_a_folded_wire_passes_no_gate_of_warnings(known: Known, tmp_path: Path) 
     assert overall["warnings"] == len(said) + len(remarks(overall))
 
 
+def test_another_simulators_wires_have_no_budget_of_ours(known: Known, tmp_path: Path) -> None:
+    """What they are off was counted as what inputs do: of a wire turned by 3 degrees nothing was beyond 2 u."""
+    folder = write_csv(tmp_path / "wires", known[1])
+    manifest, out = tmp_path / "manifest.toml", tmp_path / "out"
+    text = known[0].read_text(encoding="utf-8").replace('id = "bend"', f'id = "bend"\nsimulated = "{folder}/*.csv"')
+    for name in ("traces", "vessel.swc"):
+        text = text.replace(f'"{name}', f'"{known[0].parent / name}')
+    manifest.write_text(text, encoding="utf-8")
+    words = ["--until", "compare", "--set", "budget.members=9", *QUICK]
+    assert main(["run", str(manifest), "-o", str(out), *words]) == 0
+    result = json.loads((out / "cases" / "bend" / "result.json").read_text(encoding="utf-8"))
+    assert any(text.startswith("no budget: it is drawn by this project's own solver") for text in result["assumptions"])
+    assert not (out / "cases" / "bend" / "budget.csv").exists()
+    assert pd.read_csv(out / "overall.csv")["u_input_mm"].isna().all()
+
+
 def test_another_simulators_wire_that_lies_in_itself_has_failed(known: Known, tmp_path: Path) -> None:
     """As the solver's own."""
     wires = [*known[1][:3], folded(resample(known[1][3], 0.25), 8.0, 0.3)]

@@ -316,6 +316,21 @@ def test_a_run_that_ended_before_frames_are_compared_is_no_baseline(
     assert "no error of the simulated wire is judged frame by frame" in capsys.readouterr().out.splitlines()[-1]
 
 
+def test_a_tolerance_without_an_error_judges_nothing_where_the_ratio_is_withheld(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Of one insertion at 3.3 times the error: "not worse", exit 0."""
+    own = tmp_path / "num.toml"
+    own.write_text("max_penetration_mm = 0.1", encoding="utf-8")
+    for name, error_mm in (("one", 0.1), ("two", 0.4)):
+        write_run(tmp_path / name, (FakeCase("a", frames=3, seed=1, error_mm=error_mm),))
+        path = tmp_path / name / "cases" / "a" / ERRORS.file
+        tables.write(path, ERRORS, tables.read(path, ERRORS).assign(max_penetration_mm=0.1))
+    assert main(["diff", str(tmp_path / "one"), str(tmp_path / "two"), "--tolerance", str(own)]) == 1
+    last = capsys.readouterr().out.splitlines()[-1]
+    assert last.startswith("NOTHING WAS JUDGED: no error of the simulated wire is judged frame by frame: the tolerance")
+
+
 @pytest.mark.parametrize(("text", "said"), [("status = 1", "status holds no number"), (None, "no such file")])
 def test_a_tolerance_that_cannot_be_used_is_named(
     first: Path, tmp_path: Path, text: str | None, said: str, capsys: pytest.CaptureFixture[str]

@@ -42,7 +42,7 @@ def test_of_a_study_with_truth_the_true_error_is_said_first() -> None:
 def test_an_error_below_what_the_traces_are_known_to_is_told() -> None:
     """A wire 0.037 mm from its traces, which are known to 0.08 mm, was ok, with a skill of 0.997."""
     row = {"rms_mm": 0.037, "trace_sigma_mm": 0.08}
-    assert "A perfect wire would lie 0.113 mm from these traces" in verdict(row)
+    assert "By the traces' own standard deviation a perfect wire would lie 0.113 mm from them" in verdict(row)
     assert "perfect" not in verdict(row | {"rms_mm": 0.12})
     assert "perfect" not in verdict({"rms_mm": 0.037}), "of own curves nobody knows"
 

@@ -35,14 +35,20 @@ from pipeline.simulate.evidence import UNKNOWN_VOXELS, TraceSamples
 from pipeline.simulate.resolution import lengths_mm
 
 AT_REST, RARE = 0.9, 0.05
+NOT_OURS = (
+    "no budget: it is drawn by this project's own solver, and says what inputs do to its wires alone; of wires from "
+    "elsewhere it would take their errors for uncertainty"
+)
 DISTAL = 20
 """Number of points at a wire's end that count as distal: at the usual step of 0.5 mm its last 10 mm."""
 
 
 def budgeted(run: Context, known: Known) -> Known:
     """The case with the uncertainty budget of every frame and by source; unchanged where there can be none."""
-    frames = [f for f in known.frames if f.ok and f.simulated is not None and len(f.simulated.joints_mm) > 1]
+    frames = [f for f in known.frames if f.ok and f.solved is not None and len(f.solved.joints_mm) > 1]
     settings = run.config.budget
+    if settings.members and any(f.simulated is not None and f.solved is None for f in known.frames):
+        run.log.assumptions.append(NOT_OURS)
     if not settings.members or not frames or known.clamp is None or not np.isfinite(known.segment_mm):
         return known
     with run.log.timed("compare"):
@@ -175,7 +181,8 @@ class Work:
         each = zip(self.frames, self.seen, ensemble, budgets, strict=True)
         calm = [(frame, seen, wires) for frame, seen, wires, b in each if b is not None and b.shapes is None]
         ends = [coefficients(wires, seen, self.trace(frame, seen), self.voxel, rng) for frame, seen, wires in calm]
-        return rank_of_ends([one for one in ends if one is not None])
+        per_lumen = members_per_lumen(self.run.config.budget.members)
+        return rank_of_ends([one for one in ends if one is not None], per_lumen)
 
     def trace(self, frame: Frame, seen: FrameSample) -> TraceSamples:
         """The trace's uncertainty at the points at which a frame was compared."""

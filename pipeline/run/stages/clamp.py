@@ -44,9 +44,12 @@ def _of_another(run: Context, other: Case, given: Clamp, own: Sequence[Frame]) -
     known = with_fitted_roll(silent, trace_frames(silent, segment_vessel(silent, open_case(silent, Known()))))
     clamp = clamp_of(silent, known)
     mine, others = ({*data_of(case), *(f.voxels for f in of)} for case, of in ((run.case, own), (other, known.frames)))
-    if mine & others - {""}:
-        shares = "has scans of this case: it is not blind to them; name a case of another insertion"
-        run.log.warnings.append(f"the clamp is that of case {other.id!r}, which {shares}")
+    shares = "has scans of this case" if mine & others - {""} else ""
+    if run.case.group == other.group:
+        shares = f"is of the same insertion (group {other.group!r})"
+    if shares:
+        told = "it is not blind to it; name a case of another insertion"
+        run.log.warnings.append(f"the clamp is that of case {other.id!r}, which {shares}: {told}")
     else:
         blind = "the clamp is blind to this case's scans, it is that of case"
         run.log.assumptions.append(f"{blind} {other.id!r}: {clamp.note}")
