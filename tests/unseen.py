@@ -68,6 +68,13 @@ def unseen_figures() -> Iterator[None]:
 
 
 @pytest.fixture
+def scarce() -> Iterator[None]:
+    """For one test that looks at no figure: few are made, none is drawn."""
+    with few(), undrawn():
+        yield
+
+
+@pytest.fixture
 def unseen() -> Iterator[None]:
     """For one test, of a module that looks at figures in others."""
     with undrawn():
