@@ -6,14 +6,15 @@ drawn, and looked at, in tests/reports.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
 import pytest
 from matplotlib.figure import Figure
 
-from reports.figures import _drawing
+from reports import page
+from reports.figures import _drawing, figures_of
 
 
 class _Unseen(Figure):
@@ -32,6 +33,30 @@ def undrawn() -> Iterator[None]:
         yield
 
 
+FEW = {"case": {"scan_at_entry", "error_by_depth"}, "run": {"planned_within"}}
+"""What stands for the figures of a page that no test looks at; tests/numbers makes all of real results."""
+
+
+@contextmanager
+def few(more: Collection[str] = ()) -> Iterator[None]:
+    """Within it the pages of a run and of its cases have these figures and ``more``, the others no data."""
+
+    def chosen(name: str) -> Mapping[str, Callable[[Any], Any]]:
+        kept = FEW.get(name, set(figures_of(name)))
+        return {f: draw if f in kept or f in more else lambda _: None for f, draw in figures_of(name).items()}
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(page, "figures_of", chosen)
+        yield
+
+
+@pytest.fixture(scope="module", autouse=True)
+def few_figures(request: pytest.FixtureRequest) -> Iterator[None]:
+    """As ``unseen_figures``; a module that looks for further figures names them in ``FIGURES``."""
+    with few(getattr(request.module, "FIGURES", ())):
+        yield
+
+
 @pytest.fixture(scope="module", autouse=True)
 def unseen_figures() -> Iterator[None]:
     """For the tests of a module that imports it, or of a folder whose conftest.py does, and for their fixtures.
@@ -39,6 +64,13 @@ def unseen_figures() -> Iterator[None]:
     Processes that are started anew, as those of ``-j 2`` with two cases are, draw their figures all the same.
     """
     with undrawn():
+        yield
+
+
+@pytest.fixture
+def scarce() -> Iterator[None]:
+    """For one test that looks at no figure: few are made, none is drawn."""
+    with few(), undrawn():
         yield
 
 

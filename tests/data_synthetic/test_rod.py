@@ -36,7 +36,7 @@ def straight_shape(rod: Rod) -> object:
     ("alpha", "x", "y"), [(1.0, 0.94356676, 0.30172077), (5.0, 0.61237164, 0.71379152), (10.0, 0.44500440, 0.81060902)]
 )
 def test_elastica_under_a_dead_tip_load(alpha: float, x: float, y: float) -> None:
-    tip = cantilever(200, load_N=alpha * STIFFNESS / LENGTH**2).shape.points[-1] / LENGTH
+    tip = cantilever(100, load_N=alpha * STIFFNESS / LENGTH**2).shape.points[-1] / LENGTH
     np.testing.assert_allclose(tip, [x, y, 0.0], rtol=0.0, atol=1e-4)  # a tenth of the 0.1 % asked for
 
 
@@ -44,15 +44,15 @@ def test_elastica_converges_in_second_order() -> None:
     exact = np.array([0.61237164, 0.71379152, 0.0])
     errors = [
         np.linalg.norm(cantilever(n, load_N=5 * STIFFNESS / LENGTH**2).shape.points[-1] / LENGTH - exact)
-        for n in (50, 100, 200)
+        for n in (25, 50, 100)
     ]
     orders = np.log2(np.array(errors[:-1]) / errors[1:])
     assert np.all(np.abs(orders - 2.0) < 0.15), orders
 
 
 def test_rest_circle_is_free_of_force_and_energy() -> None:
-    curvature = 0.02
-    e = cantilever(400, rest=curvature)
+    curvature = 0.01
+    e = cantilever(200, rest=curvature)
     angle = curvature * LENGTH
     np.testing.assert_allclose(
         e.shape.points[-1], [np.sin(angle) / curvature, (1 - np.cos(angle)) / curvature, 0], rtol=0.0, atol=5e-4
@@ -98,7 +98,7 @@ def at_arc(frame: TrueFrame, places: Array) -> Array:
 
 
 def test_halving_moves_the_truth_by_less_than_a_hundredth(bend: Anatomy) -> None:
-    coarse, fine = (list(replay(insertion(bend, h), [15.0, 30.0])) for h in (0.4, 0.2))
+    coarse, fine = (list(replay(insertion(bend, h), [15.0, 24.0])) for h in (0.4, 0.2))
     for a, b in zip(coarse, fine, strict=True):
         assert a.residual_N < 1e-7
         assert distance_apart(a, b) < 0.01
@@ -119,7 +119,7 @@ def test_wall_forces_and_clamp_balance(bend: Anatomy) -> None:
 
 def test_rolling_by_half_a_turn_mirrors_a_planar_insertion(bend: Anatomy) -> None:
     """A bend in x-z and a hook in y: rolls of +90 and -90 degrees are mirror images."""
-    left, right = (next(iter(replay(insertion(bend, 0.4), [28.0], r))) for r in (90.0, -90.0))
+    left, right = (next(iter(replay(insertion(bend, 0.4), [20.0], r))) for r in (90.0, -90.0))
     np.testing.assert_allclose(left.points_mm * [1, -1, 1], right.points_mm, rtol=0.0, atol=1e-5)
     assert abs(left.points_mm[-1, 1]) > 0.3
 
@@ -127,7 +127,7 @@ def test_rolling_by_half_a_turn_mirrors_a_planar_insertion(bend: Anatomy) -> Non
 def test_roll_chooses_the_branch() -> None:
     fork = shapes.bifurcation()
     for roll, side in ((0.0, 1.0), (180.0, -1.0)):
-        tip = next(iter(replay(insertion(fork, 0.4), [24.0], roll))).points_mm[-1]
+        tip = next(iter(replay(insertion(fork, 0.8), [24.0], roll))).points_mm[-1]
         assert side * tip[0] > 3.0
 
 
@@ -135,7 +135,7 @@ def test_rigid_motion_moves_the_truth_along(bend: Anatomy) -> None:
     """The whole scene turned about z by 40 degrees: the wire turns with it."""
     c, s = np.cos(0.7), np.sin(0.7)
     turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1.0]])
-    here = next(iter(replay(insertion(bend, 0.4), [25.0], 30.0)))
+    here = next(iter(replay(insertion(bend, 0.4), [20.0], 30.0)))
     moved = Anatomy(tuple(replace(t, points_mm=t.points_mm @ turn.T, tangents=t.tangents @ turn.T) for t in bend.tubes))
-    there = next(iter(replay(insertion(moved, 0.4, material_axis=turn @ X), [25.0], 30.0)))
+    there = next(iter(replay(insertion(moved, 0.4, material_axis=turn @ X), [20.0], 30.0)))
     np.testing.assert_allclose(here.points_mm @ turn.T, there.points_mm, rtol=0.0, atol=1e-6)

@@ -52,6 +52,7 @@ def test_coverage_looks_at_every_tube_that_counts() -> None:
     share = lumen_coverage(tree, grid)
     index = np.argwhere((share > 0) & (share < 1))
     assert len(index) > 2000
+    index = index[::3]
     inside, steps = np.zeros(len(index)), 0.9 * ((np.arange(SUBSAMPLES) + 0.5) / SUBSAMPLES - 0.5)
     for offset in np.stack(np.meshgrid(steps, steps, steps, indexing="ij"), axis=-1).reshape(-1, 3):
         distance = tree.distance(grid.to_mm(index) + offset)

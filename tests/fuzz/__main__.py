@@ -33,7 +33,9 @@ def base_study(folder: Path) -> Path:
     """A small sound study, run once so that everything is loaded."""
     study = folder / "base"
     made = wireval(["synth", "bifurcation", "-o", str(study), "--size", "56", "--frames", "1", "--seed", "7"])
-    done = wireval(["run", str(study / "manifest.toml"), "-o", str(folder / "warm"), "--no-cache"])
+    done = wireval(
+        ["run", str(study / "manifest.toml"), "-o", str(folder / "warm"), "--no-cache", "--until", "compare"]
+    )
     assert (made, done) == (0, 0)
     return study
 

@@ -8,11 +8,21 @@ import numpy as np
 from scipy import ndimage
 
 
-def affinity(one: int, other: int, tables) -> int:
-    """Quantised affinity 0..255 of two grey levels: sqrt(H O), from the tables' definition."""
-    h = np.float32(tables.homogeneity[abs(one - other)])
-    o = np.float32(tables.feature[one + other])
-    return int(float(np.float32(h * o)) + 0.5)
+def affinities(one, other, tables):
+    """Quantised affinities 0..255 of pairs of grey levels: sqrt(H O), from the tables' definition."""
+    h = tables.homogeneity[np.abs(one - other)].astype(np.float32)
+    o = tables.feature[one + other].astype(np.float32)
+    return ((h * o).astype(float) + 0.5).astype(int)
+
+
+def links_of(level, offsets, tables):
+    """For every offset the affinity of each voxel to its neighbour there; 0 where that is outside."""
+    found, inner = [], tuple(slice(1, -1) for _ in level.shape)
+    padded = np.pad(level, 1, constant_values=-1)
+    for step in offsets:
+        other = np.roll(padded, [-int(s) for s in step], axis=(0, 1, 2))[inner]
+        found.append(np.where(other < 0, 0, affinities(level, np.maximum(other, 0), tables)))
+    return np.stack(found, axis=-1)
 
 
 def quantised(values, tables):
@@ -30,22 +40,21 @@ def smoothed(values, taps):
 
 def strengths(values, seeds, tables, offsets, threshold: int):
     """Strength of the best path from any seed to every voxel; 0 below the threshold."""
-    level = quantised(values, tables)
-    best = np.zeros(values.shape, int)
-    heap = []
+    links = links_of(quantised(values, tables), offsets, tables)
+    links = np.where(links < threshold, 0, links).reshape(-1, len(offsets)).tolist()
+    strides = [int(np.dot(step, [values.shape[1] * values.shape[2], values.shape[2], 1])) for step in offsets]
+    best, heap = [0] * values.size, []
     for seed in seeds:
-        best[tuple(seed)] = 255
-        heapq.heappush(heap, (-255, tuple(int(s) for s in seed)))
+        here = int(np.ravel_multi_index(tuple(seed), values.shape))
+        best[here] = 255
+        heapq.heappush(heap, (-255, here))
     while heap:
         negative, here = heapq.heappop(heap)
         if -negative < best[here]:
             continue
-        for step in offsets:
-            there = tuple(int(a + b) for a, b in zip(here, step, strict=True))
-            if any(c < 0 or c >= n for c, n in zip(there, values.shape, strict=True)):
-                continue
-            link = min(-negative, affinity(level[here], level[there], tables))
-            if link >= threshold and link > best[there]:
-                best[there] = link
-                heapq.heappush(heap, (-link, there))
-    return best
+        for link, step in zip(links[here], strides, strict=True):
+            reached = min(-negative, link)
+            if reached and reached > best[here + step]:
+                best[here + step] = reached
+                heapq.heappush(heap, (-reached, here + step))
+    return np.array(best).reshape(values.shape)

@@ -61,8 +61,9 @@ def looks(figure: Figure) -> dict[str, list[float]]:
     found["grids"] = digest(
         [v for a in figure.axes for v in (a.get_axisbelow() is True, len(a.get_xscale() + a.get_yscale()))]
     )
+    artists = figure.findobj()
     for name, kind, of in LOOKS:
-        found[name] = digest([float(value) for artist in figure.findobj(kind) for value in of(artist)])
+        found[name] = digest([float(value) for one in artists if isinstance(one, kind) for value in of(one)])
     return found
 
 

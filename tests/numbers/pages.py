@@ -1,4 +1,4 @@
-"""The pages of invented results: what stands in them, and how their figures are drawn."""
+"""The pages of invented results: what stands in them, and how their figures are drawn, looked at before they are."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from tests.numbers.drawn import TIMED, drawn, looks, said
 from tests.numbers.kept import Numbers, Scene
 from tests.reports.fake_pages import write_pages
 from tests.reports.fake_results import FakeCase, write_run
+from tests.unseen import undrawn
 
 CASES = (
     FakeCase("true", frames=5, truth=True),
@@ -26,7 +27,7 @@ CASES = (
 
 def run() -> Numbers:
     """The pages of a run, of its cases, and its summary on paper."""
-    with tempfile.TemporaryDirectory() as folder, drawn() as found:
+    with tempfile.TemporaryDirectory() as folder, undrawn(), drawn() as found:
         out = write_run(Path(folder) / "out", CASES, sweep=True)
         for case in find_cases(out):
             render_case(case)
@@ -40,7 +41,7 @@ def run() -> Numbers:
 
 def beside() -> Numbers:
     """The pages beside those of a run."""
-    with tempfile.TemporaryDirectory() as folder, drawn() as found:
+    with tempfile.TemporaryDirectory() as folder, undrawn(), drawn() as found:
         out = write_run(Path(folder) / "out", CASES[:1])
         for path in write_pages(out, Path(folder)):
             found |= said(f"{path.stem}.page", path.read_text(encoding="utf-8"))

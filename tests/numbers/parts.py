@@ -25,7 +25,7 @@ PARTS = {
     "imaging": Part(imaging.SCENES, 1e-4),
     # with eight members a budget's scores move by 2e-4 from one processor to another
     "runs": Part(runs.SCENES, 1e-3),
-    "traces": Part(traces.SCENES, 1e-4),
+    "traces": Part(traces.SCENES, traces.RELATIVE),
     # the numbers of a sentence have two or three digits
     "sentences": Part(sentences.SCENES, 1e-4),
     # what hardly shows in the traces hangs on their last digits

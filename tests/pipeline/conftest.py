@@ -2,6 +2,7 @@
 
 import pytest
 
+from tests.unseen import few_figures as few_figures
 from tests.unseen import unseen_figures as unseen_figures
 
 

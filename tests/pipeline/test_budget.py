@@ -41,6 +41,7 @@ from reports.figures import figures_of
 from reports.schema import BUDGET, ENTRIES, ERRORS, POINTS, SUMMARY
 from solver import Grid
 
+FIGURES = ("budget", "error_over_u")
 WIRE = Wire("w", 0.18, [(0.0, 0.5), (30.0, 5.0)], [(0.0, 0.12), (8.0, 0.12), (8.0, 0.0)])
 ALONG_Z = np.column_stack([np.zeros(61), np.zeros(61), np.linspace(0.0, 30.0, 61)])
 

@@ -101,7 +101,7 @@ def test_rolls_that_are_stated_wrongly_have_no_common_offset(stated_deg, apart):
     assert roll.used == (0.0 if apart else pytest.approx(17.0, abs=1.0))
 
 
-@pytest.mark.parametrize("off_deg", [9.0, 20.0])
+@pytest.mark.parametrize("off_deg", [9.0, pytest.param(20.0, marks=pytest.mark.slow)])
 def test_rolls_that_are_stated_a_little_wrongly_are_no_taper(off_deg):
     """Rolls stated 5 to 20 degrees wrong, each otherwise: the taper was 0.76 to 1.5, seen, up to 6.5 sd off."""
     turns = (off_deg, -off_deg, 0.5 * off_deg)

@@ -551,7 +551,8 @@ def test_a_case_beyond_its_time_is_named_with_its_stage(
     assert "took longer than the 0.01 s" in failures["message"][0]
 
 
-UNTIL = ("--until", "compare")  # without pages, which are no matter here
+# without pages, budget and simulated predictors, which are no matter here
+UNTIL = ("--until", "compare", "--set", "budget.members=0", "--set", "compare.simulated_nulls=false")
 
 
 def changing(monkeypatch: pytest.MonkeyPatch, stage: str, change: Callable[[], object]) -> None:

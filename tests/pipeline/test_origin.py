@@ -22,6 +22,7 @@ from reports.origin import of_two_simulators, what_differs, why_not_pooled
 from tests.pipeline.test_calibrate import PARAMETERS
 
 QUICK = ("--until", "load", "-q")
+COMPARED = ("--until", "compare", "-q", "--set", "budget.members=0", "--set", "compare.simulated_nulls=false")
 FINE = ("--set", "solver.step_mm=0.5")
 
 
@@ -353,14 +354,14 @@ def test_what_a_shard_saw_among_its_cases_alone_is_not_said_of_all(
     monkeypatch.setattr(aggregate, "copies", lambda scored: [f"they count as {len(scored)}"])
     out, whole = tmp_path / "out", tmp_path / "whole"
     for shard in ("1/2", "2/2"):
-        main(["run", str(study), "-o", str(out), "--until", "compare", "-q", "--shard", shard])
+        main(["run", str(study), "-o", str(out), *COMPARED, "--shard", shard])
     assert doubted(out) == ["they count as 2"], "the second shard saw the first one's case"
     for shard in ("1/2", "2/2"):
-        main(["run", str(study), "-o", str(tmp_path / shard[0]), "--until", "compare", "-q", "--shard", shard])
+        main(["run", str(study), "-o", str(tmp_path / shard[0]), *COMPARED, "--shard", shard])
         shutil.copytree(tmp_path / shard[0], out, dirs_exist_ok=True)
     assert doubted(out) == ["they count as 1"]
     main(["report", str(out), "--overview"])
-    main(["run", str(study), "-o", str(whole), "--until", "compare", "-q"])
+    main(["run", str(study), "-o", str(whole), *COMPARED])
     assert doubted(out) == doubted(whole) == ["they count as 2"]
     assert (out / "overall.csv").read_bytes() == (whole / "overall.csv").read_bytes()
 

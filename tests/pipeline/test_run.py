@@ -41,6 +41,7 @@ from tests.studies.trees import differences
 
 SIZE, FRAMES = 64, 4
 UNTIL = ("--until", "compare")  # where no page is looked at: drawing them takes most of a run
+QUICK = (*UNTIL, "--set", "compare.simulated_nulls=false", "--set", "budget.members=0")  # nor predictors and budget
 
 
 @pytest.fixture(scope="module")
@@ -50,6 +51,14 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
         main(["synth", "bifurcation", "-o", str(folder), "--size", str(SIZE), "--frames", str(FRAMES), "--seed", "7"])
         == 0
     )
+    return folder
+
+
+@pytest.fixture(scope="module")
+def short(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The study with two frames."""
+    folder = tmp_path_factory.mktemp("short")
+    assert main(["synth", "bifurcation", "-o", str(folder), "--size", str(SIZE), "--frames", "2", "--seed", "7"]) == 0
     return folder
 
 
@@ -158,17 +167,17 @@ def test_fresh_removes_the_cases_of_the_manifest_before(
 ) -> None:
     """One that is resumed leaves them aside, says so, and what anybody else has put into the folder stays."""
     out, other = tmp_path / "out", tmp_path / "study"
-    assert run(study, out, *UNTIL) == 0
+    assert run(study, out, "--until", "trace") == 0
     shutil.copytree(study, other)
     manifest = other / "manifest.toml"
     text = manifest.read_text(encoding="utf-8").replace('id = "bifurcation"', 'id = "renamed"')
     manifest.write_text(text, encoding="utf-8")
     (out / "cases" / "mine").mkdir()
-    assert run(other, out, "--resume", *UNTIL) == 0
+    assert run(other, out, "--resume", "--until", "trace") == 0
     said = capsys.readouterr()
     assert "1 case, 4 frames" in said.out
     assert "no manifest of this folder names them any more: bifurcation" in said.err
-    assert run(other, out, "--fresh", *UNTIL) == 0
+    assert run(other, out, "--fresh", "--until", "trace") == 0
     assert "any more" not in capsys.readouterr().err
     assert {path.name for path in (out / "cases").iterdir()} == {"renamed", "mine"}
 
@@ -212,9 +221,9 @@ def test_a_sweep_of_other_settings_is_not_shown_beside_a_new_result(
 ) -> None:
     """Nor a summary on paper: both stood beside the new numbers as if they were theirs."""
     out = tmp_path / "out"
-    assert run(study, out, "--sweep", "simulate.wall_scale=2", *UNTIL) == 0
+    assert run(study, out, "--sweep", "simulate.wall_scale=2", *QUICK) == 0
     (out / "summary.pdf").touch()
-    assert run(study, out, "--set", "simulate.friction=0.1", "--resume", *UNTIL) == 0
+    assert run(study, out, "--set", "simulate.wall_scale=3", "--resume", *QUICK) == 0
     said = capsys.readouterr()
     last = said.out.splitlines()[-1]
     assert f"{out / 'sweep.csv'}: removed, it belongs to an earlier run" in said.err
@@ -224,15 +233,16 @@ def test_a_sweep_of_other_settings_is_not_shown_beside_a_new_result(
     assert not (out / "summary.pdf").exists()
 
 
-def test_a_sweep_reads_the_lumen_of_a_case_once(study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_sweep_reads_the_lumen_of_a_case_once(short: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """And prepares its wall once: its points follow each other. The two cases here have one scan, and so one lumen."""
-    both, out, read = two_cases(study, tmp_path / "study"), tmp_path / "out", []
+    both, out, read = two_cases(short, tmp_path / "study"), tmp_path / "out", []
     monkeypatch.setattr(cache, "decoded", lambda *args: read.append(args[0]) or decoded(*args))
     wall_of.cache_clear()
-    assert run(both, out, "--sweep", "simulate.wall_scale=0.5,2", "--sweep", "simulate.friction=0.3", *UNTIL) == 0
+    points = "--sweep", "simulate.wall_scale=0.5,2", "--sweep", "simulate.roll_offset_deg=30"
+    assert run(both, out, *points, *QUICK) == 0
     assert read.count("segment") == 1
     assert wall_of.cache_info().misses <= 2, "of the lumen as it was segmented, and as it was read"
-    assert run(both, out, "--sweep", "simulate.wall_scale=0.25,3", "--resume", *UNTIL) == 0
+    assert run(both, out, "--sweep", "simulate.wall_scale=0.25", "--resume", *QUICK) == 0
     assert read.count("segment") == 2, "another run reads it anew"
 
 
@@ -295,7 +305,7 @@ def test_a_lumen_that_lies_elsewhere_is_what_fails(study: Path, finished: Path, 
     labels = sitk.GetArrayFromImage(like)
     like.SetOrigin((0.0, 0.0, 0.0))
     folder = with_lumen(study, tmp_path / "study", labels, like)
-    assert run(folder, tmp_path / "out", *UNTIL) == 1
+    assert run(folder, tmp_path / "out", *QUICK) == 1
     assert set(errors_of(tmp_path / "out")["status"]) == {"segment_failed"}
     assert "outside the given lumen, which spans" in (tmp_path / "out" / "failures.csv").read_text(encoding="utf-8")
 
@@ -311,13 +321,13 @@ def test_an_edited_lumen_gives_new_traces(study: Path, finished: Path, tmp_path:
     labels = sitk.GetArrayFromImage(like)
     folder = with_lumen(study, tmp_path / "study", labels, like)
     out = tmp_path / "out"
-    assert run(folder, out, *UNTIL) == 0
+    assert run(folder, out, "--until", "simulate") == 0
     assert reused_traces(out) == 0
-    assert run(folder, out, "--resume", "--set", "simulate.wall_scale=2", *UNTIL) == 0
+    assert run(folder, out, "--resume", "--set", "simulate.wall_scale=2", "--until", "simulate") == 0
     assert reused_traces(out) == FRAMES
     labels[tuple(np.argwhere(labels)[0])] = 0
     with_lumen(study, folder, labels, like)
-    assert run(folder, out, "--resume", *UNTIL) == 0
+    assert run(folder, out, "--resume", "--until", "simulate") == 0
     assert reused_traces(out) == 0
 
 
@@ -507,11 +517,11 @@ def two_cases(study: Path, folder: Path, broken: bool = False) -> Path:
     return folder
 
 
-def test_the_same_scans_count_once(study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    both = two_cases(study, tmp_path / "study")
+def test_the_same_scans_count_once(short: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    both = two_cases(short, tmp_path / "study")
     assert main(["check", str(both)]) == 0
     assert "warning: cases 'bifurcation' and 'second' share" in capsys.readouterr().out
-    assert run(both, tmp_path / "out", *UNTIL) == 0
+    assert run(both, tmp_path / "out", *QUICK) == 0
     assert "bifurcation, second have scans or curves in common and count as one insertion" in capsys.readouterr().err
     assert pd.read_csv(tmp_path / "out" / "overall.csv")["insertions"].item() == 1
     manifest = both / "manifest.toml"
@@ -549,7 +559,7 @@ def test_a_frame_under_two_names_counts_once(study: Path, tmp_path: Path, capsys
     kept = [line for line in manifest.read_text(encoding="utf-8").splitlines() if not line.startswith(("ins", "tru"))]
     manifest.write_text("\n".join(kept).replace("frames/*.mha", "frames/*"), encoding="utf-8")
     assert main(["check", str(folder)]) == 0
-    assert run(folder, out, "--until", "compare") == 1
+    assert run(folder, out, *QUICK) == 1
     assert "repeated: it has the voxels of frame 0" in capsys.readouterr().err
     errors = tables.read(out / "cases" / "bifurcation" / "errors.csv", ERRORS)
     assert list(errors["status"]).count("repeated") == 1
@@ -557,17 +567,17 @@ def test_a_frame_under_two_names_counts_once(study: Path, tmp_path: Path, capsys
 
 
 def test_the_same_voxels_in_other_files_are_one_insertion(
-    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    short: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """One insertion saved three times had a 95 % interval of no width, over three insertions."""
-    both = two_cases(study, tmp_path / "study")
+    both = two_cases(short, tmp_path / "study")
     (both / "again").mkdir()
     for path in (both / "frames").iterdir():
         sitk.WriteImage(sitk.ReadImage(str(path)), str(both / "again" / f"{path.stem}.nrrd"))
     head, case, second = (both / "manifest.toml").read_text(encoding="utf-8").split("[[case]]")
     second = second.replace("frames/*.mha", "again/*.nrrd")
     (both / "manifest.toml").write_text("[[case]]".join((head, case, second)), encoding="utf-8")
-    assert run(both, tmp_path / "out", *UNTIL) == 0
+    assert run(both, tmp_path / "out", *QUICK) == 0
     assert "bifurcation, second have scans or curves in common and count as one insertion" in capsys.readouterr().err
     assert pd.read_csv(tmp_path / "out" / "overall.csv")["insertions"].item() == 1
 
@@ -585,7 +595,7 @@ def test_own_curves_are_held_against_the_wires_that_are_seen(study: Path, finish
     for order in (curves, curves[::-1]):
         for number, curve in enumerate(order):
             np.savetxt(folder / "own" / f"{number:03d}.csv", curve, delimiter=",", header="x_mm,y_mm,z_mm", comments="")
-        run(folder, tmp_path / "out", *UNTIL, "--fresh")
+        run(folder, tmp_path / "out", *QUICK, "--fresh")
         result = json.loads((tmp_path / "out" / "cases" / "bifurcation" / "result.json").read_text(encoding="utf-8"))
         said.append([text for text in result["warnings"] if "own curves are not where the scans show" in text])
     assert not said[0]
@@ -594,9 +604,9 @@ def test_own_curves_are_held_against_the_wires_that_are_seen(study: Path, finish
     assert "mm longer" in text
 
 
-def test_results_do_not_depend_on_workers_or_shards(study: Path, finished: Path, tmp_path: Path) -> None:
+def test_results_do_not_depend_on_workers_or_shards(short: Path, tmp_path: Path) -> None:
     """Shards are merged by copying folders together; their tables are those of a run of all cases, byte by byte."""
-    both, more = two_cases(study, tmp_path / "study"), ("--sweep", "simulate.wall_scale=2", *UNTIL)
+    both, more = two_cases(short, tmp_path / "study"), ("--sweep", "simulate.wall_scale=2", *QUICK)
     assert run(both, tmp_path / "pool", "-j", "2", "--no-cache", *more) == 0
     for shard in ("1/2", "2/2"):
         assert run(both, tmp_path / shard[0], "--shard", shard, *more) == 0
@@ -608,7 +618,7 @@ def test_results_do_not_depend_on_workers_or_shards(study: Path, finished: Path,
         assert (tmp_path / "shards" / name).read_bytes() == (tmp_path / "pool" / name).read_bytes(), name
     assert len(pd.read_csv(tmp_path / "pool" / "timings.csv")) == 2
     table = tables.read(tmp_path / "pool" / "cases" / "second" / "errors.csv", ERRORS)
-    pd.testing.assert_frame_equal(table, errors_of(finished))
+    pd.testing.assert_frame_equal(table, errors_of(tmp_path / "1"))
     assert main(["report", str(tmp_path / "shards"), "-j", "2"]) == 0
     assert (tmp_path / "shards" / "cases" / "second" / "report.html").exists()
 
@@ -616,7 +626,7 @@ def test_results_do_not_depend_on_workers_or_shards(study: Path, finished: Path,
 def test_a_damaged_frame_costs_that_frame_alone(study: Path, tmp_path: Path) -> None:
     both = two_cases(study, tmp_path / "study", broken=True)
     out = tmp_path / "out"
-    assert run(both, out, *UNTIL) == 1
+    assert run(both, out, *QUICK) == 1
     statuses = list(tables.read(out / "cases" / "second" / "errors.csv", ERRORS)["status"])
     assert statuses == ["ok", "load_failed", "ok", "ok"]
     failures = pd.read_csv(out / "failures.csv")
@@ -641,9 +651,9 @@ def aside(clamp: Clamp) -> Clamp:
 
 
 def test_an_unexpected_error_costs_one_case(
-    study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    short: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    both = two_cases(study, tmp_path / "study")
+    both = two_cases(short, tmp_path / "study")
 
     def burst(job: object) -> None:
         if job.case.id == "second":  # type: ignore[attr-defined]
@@ -655,7 +665,7 @@ def test_an_unexpected_error_costs_one_case(
 
     monkeypatch.setattr("pipeline.run.launch.run_case", burst)
     monkeypatch.setattr("sys.argv", ["/bin/wireval", "run", "study", "-o", "out"])
-    assert run(both, tmp_path / "out", *UNTIL) == 1
+    assert run(both, tmp_path / "out", *QUICK) == 1
     said = capsys.readouterr().err.splitlines()
     assert said[-1] == "next: see to what the messages name, then wireval run study -o out --only second --resume"
     assert said[-1].partition("then ")[2] in (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
@@ -695,7 +705,7 @@ def test_the_entry_is_inferred_where_the_wire_comes_in(study: Path, finished: Pa
 
 
 def test_a_crash_in_a_sweep_is_said_and_counted(
-    study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    short: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     def burst(job: Job) -> None:
         if job.settings.config.simulate.wall_scale == 2.0:
@@ -703,7 +713,7 @@ def test_a_crash_in_a_sweep_is_said_and_counted(
         run_case(job)
 
     monkeypatch.setattr("pipeline.run.launch.run_case", burst)
-    assert run(study, tmp_path / "out", "--sweep", "simulate.wall_scale=2", *UNTIL) == 1
+    assert run(short, tmp_path / "out", "--sweep", "simulate.wall_scale=2", *QUICK) == 1
     said = capsys.readouterr()
     assert "simulate.wall_scale=2: bifurcation: crashed: RuntimeError: burst pipe" in said.err
     assert "1 result of the sweep lost" in said.out
@@ -874,7 +884,7 @@ def test_a_case_without_frames_is_no_frame_that_was_planned(finished: Path, stud
     plan = "\n".join(lines).replace('id = "bifurcation"', 'id = "plan"')
     manifest = study / "planned.toml"
     manifest.write_text(f"{head}[[case]]{case}\n[[case]]{plan}", encoding="utf-8")
-    assert main(["run", str(manifest), "-o", str(tmp_path / "out"), *UNTIL]) == 0
+    assert main(["run", str(manifest), "-o", str(tmp_path / "out"), *QUICK]) == 0
     whole = [tables.read(out / "overall.csv", SUMMARY).iloc[0] for out in (finished, tmp_path / "out")]
     assert whole[1]["frames"] == whole[0]["frames"] == FRAMES
     assert whole[1]["within_1mm"] == whole[0]["within_1mm"]

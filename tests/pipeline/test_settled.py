@@ -29,7 +29,7 @@ def test_what_is_hardly_filled_moves_the_wall_by_a_bounded_way() -> None:
     assert 0 < float(filled.at(np.zeros((1, 3)))[0][0]) < 1.5, "blurs; without end at half of the lowest and less"
 
 
-@pytest.mark.parametrize(("seed", "most"), [(0, 0.35), (12, 0.2)])
+@pytest.mark.parametrize(("seed", "most"), [(0, 0.35), pytest.param(12, 0.2, marks=pytest.mark.slow)])
 def test_medium_that_has_settled_is_said_and_the_wall_found(seed: int, most: float) -> None:
     row = look("contrast that has settled", seed)
     assert row.verdict == "right"

@@ -22,6 +22,7 @@ from tests.pipeline.known_study import QUICK, Known, errors_of, peers, run_known
 Array = NDArray[np.float64]
 CENTRE = np.array([12.0, 0.0, 10.0])
 WITHIN_MM = 0.02
+FIGURES = ("views", "projections")
 
 
 @pytest.fixture(scope="module")

@@ -21,6 +21,8 @@ from reports.figures import Drawing, declared, figures_of
 from reports.run_page import render_index
 from reports.schema import ERRORS, FAILURES, SUMMARY
 from tests.reports.fake_results import EVERY_KIND, FakeCase, write_run
+from tests.unseen import scarce as scarce
+from tests.unseen import undrawn
 from tests.unseen import unseen as unseen
 
 CASE_FIGURES = figures_of("case")
@@ -47,10 +49,13 @@ class _Links(HTMLParser):
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """One rendered run with a case of every kind; tests only read it."""
+    """One rendered run with a case of every kind, of which one is drawn; tests only read it."""
     out = write_run(tmp_path_factory.mktemp("run") / "out", KINDS, sweep=True)
-    for folder in find_cases(out):
-        render_case(folder)
+    with undrawn():
+        for folder in find_cases(out):
+            if folder.name != FAILED:
+                render_case(folder)
+    render_case(out / "cases" / FAILED)
     render_index(out)
     return out
 
@@ -105,7 +110,7 @@ def test_each_kind_of_case_has_its_sections(run: Path) -> None:
     assert {name for name, found in ids.items() if "failures" in found} == {FAILED}
 
 
-@pytest.mark.usefixtures("unseen")
+@pytest.mark.usefixtures("scarce")
 def test_the_files_of_view_are_counted_and_not_printed(tmp_path: Path) -> None:
     """Some seven a frame: they filled two sheets of paper and four screens."""
     case = find_cases(write_run(tmp_path / "out", KINDS[:1]))[0]
@@ -218,7 +223,7 @@ def test_captions_speak_of_no_budget_where_none_was_drawn(tmp_path: Path) -> Non
         assert absent not in " ".join(re.findall(r"<figcaption>(.*?)</figcaption>", page, re.S)), absent
 
 
-@pytest.mark.usefixtures("unseen")
+@pytest.mark.usefixtures("scarce")
 def test_a_lumen_that_is_not_found_is_one_failure_not_one_a_frame(tmp_path: Path) -> None:
     out = write_run(tmp_path / "out", (FakeCase("c", frames=3),))
     path = out / "cases" / "c" / "result.json"
@@ -240,7 +245,7 @@ def test_why_frames_failed_is_said_of_them_alone(run: Path) -> None:
     assert said.startswith("4 of 6 frames have a result. The simulated wire lies")
 
 
-@pytest.mark.usefixtures("unseen")
+@pytest.mark.usefixtures("scarce")
 def test_a_case_that_died_still_has_a_page_and_is_listed(tmp_path: Path) -> None:
     out = write_run(tmp_path / "out", (FakeCase("fine", frames=3),))
     dead = out / "cases" / "dead"
@@ -253,7 +258,7 @@ def test_a_case_that_died_still_has_a_page_and_is_listed(tmp_path: Path) -> None
     assert 'class="status bad"' in text
 
 
-@pytest.mark.usefixtures("unseen")
+@pytest.mark.usefixtures("scarce")
 def test_a_crash_counts_its_frames_on_the_pages_as_on_the_terminal(tmp_path: Path) -> None:
     """A crashed case has the row that the terminal counts from, and no frames of its own."""
     out = write_run(tmp_path / "out", (FakeCase("fine", frames=3, failed=(1,)),))
@@ -305,7 +310,7 @@ def test_a_damaged_file_is_named(tmp_path: Path, name: str, content: bytes) -> N
         read_case(tmp_path)
 
 
-@pytest.mark.usefixtures("unseen")
+@pytest.mark.usefixtures("scarce")
 def test_one_damaged_case_does_not_hide_the_others(tmp_path: Path) -> None:
     out = write_run(tmp_path / "out", (FakeCase("fine", frames=3), FakeCase("hurt", frames=3)))
     (out / "cases" / "hurt" / "frames.h5").write_bytes(b"x" * 99)
@@ -348,7 +353,7 @@ def test_cases_come_worst_first_and_a_tall_map_leaves_the_first_screen(tmp_path:
     assert ids.index("planned_within") < ids.index("cases") < ids.index("case_frame_map")
 
 
-@pytest.mark.usefixtures("unseen")
+@pytest.mark.usefixtures("scarce")
 def test_a_calibration_case_is_not_said_to_be_better(tmp_path: Path) -> None:
     """Its parameters were learnt from it."""
     write_run(tmp_path, [FakeCase("learnt", frames=3, role="calibration"), FakeCase("judged", frames=3)])
@@ -358,7 +363,7 @@ def test_a_calibration_case_is_not_said_to_be_better(tmp_path: Path) -> None:
     assert "That is better" in text["judged"]
 
 
-@pytest.mark.usefixtures("unseen")
+@pytest.mark.usefixtures("scarce")
 def test_a_case_that_is_worse_than_a_guess_is_marked_and_named(tmp_path: Path) -> None:
     """The index was green and said "That is better" of both together."""
     out = write_run(tmp_path / "out", (FakeCase("a", 3), FakeCase("b", 3)))
@@ -372,7 +377,7 @@ def test_a_case_that_is_worse_than_a_guess_is_marked_and_named(tmp_path: Path) -
     assert "only marked rows" in page
 
 
-@pytest.mark.usefixtures("unseen")
+@pytest.mark.usefixtures("scarce")
 @pytest.mark.parametrize(("skill", "said"), [(0.9, True), (None, False)])
 def test_a_case_page_says_who_is_judged_over_the_run_alone(tmp_path: Path, skill: float | None, said: bool) -> None:
     """Beside a skill of the case, and nowhere else: an empty field is no predictor."""
@@ -383,7 +388,7 @@ def test_a_case_page_says_who_is_judged_over_the_run_alone(tmp_path: Path, skill
     assert ("it is judged over the run" in render_case(folder).read_text(encoding="utf-8")) == said
 
 
-@pytest.mark.usefixtures("unseen")
+@pytest.mark.usefixtures("scarce")
 def test_a_scan_that_the_roll_was_fitted_on_is_no_frame_that_is_ok(tmp_path: Path) -> None:
     """Six scans were "Every frame is ok" and "5 frames: 5 ok"."""
     out = write_run(tmp_path / "out", (FakeCase("a", 5),))
@@ -396,7 +401,7 @@ def test_a_scan_that_the_roll_was_fitted_on_is_no_frame_that_is_ok(tmp_path: Pat
     assert f'<p class="verdict">{said} The simulated' in render_case(out / "cases" / "a").read_text(encoding="utf-8")
 
 
-@pytest.mark.usefixtures("unseen")
+@pytest.mark.usefixtures("scarce")
 def test_all_scans_that_cannot_be_read_are_named(tmp_path: Path) -> None:
     out = write_run(tmp_path / "out", (FakeCase("a", 5, failed=(1, 3)),))
     rows = tables.read(out / "failures.csv", FAILURES)

@@ -15,6 +15,7 @@ from reports.figures._style import LINES, predictors
 from reports.run_page import render_index
 from reports.schema import ERRORS, PLACES, SUMMARY, Column, predictor
 from tests.reports.fake_results import FakeCase, write_run
+from tests.unseen import scarce as scarce
 
 CASE_FIGURES = figures_of("case")
 
@@ -45,6 +46,7 @@ def _legend(drawing: Drawing | None) -> dict[str, str]:
     return {label: str(handle.get_color()) for handle, label in zip(handles, labels, strict=True)}
 
 
+@pytest.mark.usefixtures("scarce")
 def test_a_metric_from_outside_is_one_registration(tmp_path: Path) -> None:
     shown = {"frames": "", "error_by_depth": "area between the wires"}
     area = Column(
@@ -72,6 +74,7 @@ def test_a_metric_from_outside_is_one_registration(tmp_path: Path) -> None:
     assert worse.regressions["column"].tolist() == ["area_mm"]
 
 
+@pytest.mark.usefixtures("scarce")
 def test_a_predictor_from_outside_is_one_registration(tmp_path: Path) -> None:
     median = predictor("median_frame", "median frame", "the traced wire of the median frame")
     ERRORS.add(median)

@@ -124,22 +124,26 @@ LUMENS = (
 )  # fmt: skip
 
 
-def look(name, seed, **otherwise):
-    """One scene through segment and trace. otherwise : what the manifest says instead."""
+def found(name, seed, **otherwise):
+    """A scene, its lumen and its curve. otherwise : what the manifest says instead."""
     scene = CASES[name](np.random.default_rng([seed, list(CASES).index(name)]), seed)
-    row = Row(name, seed)
+    radius = None if scene.reference else scene.wire_radius
+    lumen = segment(scene.reference or scene.frame, scene.entry[None], wire_radius_mm=radius)
+    stated = scene.stated | otherwise
+    return scene, lumen, trace(scene.frame, lumen, scene.entry, scene.direction, reference=scene.reference, **stated)
+
+
+def look(name, seed, **otherwise):
+    """One scene through segment and trace."""
     try:
-        lumen = segment(
-            scene.reference or scene.frame,
-            scene.entry[None],
-            wire_radius_mm=None if scene.reference else scene.wire_radius,
-        )
+        return row_of(name, seed, *found(name, seed, **otherwise))
     except StageError as error:
-        row.verdict, row.status, row.text = "refused", "SEGMENT_FAILED", str(error)
-        return row
-    curve = trace(
-        scene.frame, lumen, scene.entry, scene.direction, reference=scene.reference, **scene.stated | otherwise
-    )
+        return Row(name, seed, "refused", "SEGMENT_FAILED", str(error))
+
+
+def row_of(name, seed, scene, lumen, curve):
+    """What became of a scene."""
+    row = Row(name, seed)
     row.status, row.text, row.levels = curve.status.name, curve.note, dict(curve.levels) | dict(curve.counters)
     fault, row.wall = lumen_faults(lumen, scene) if name in LUMENS else ("", np.nan)
     ok = curve.status is FrameStatus.OK
