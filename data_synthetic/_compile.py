@@ -3,6 +3,9 @@
 By itself numba looks at the file of a function alone: after an edit in ``newton`` it would go on running the old code
 inside ``minimise``. Here the mark that it compares is a hash of every file of ours that the function's file imports,
 directly or through others. ``solver`` and ``data_synthetic`` hold one copy each, since they share no imports.
+
+And numba numbers the files of a function's machine code: of two processes that compiled it for other types at one time,
+each might take the number 1, and what was kept for one's types was the other's code from then on.
 """
 
 import functools
@@ -13,6 +16,7 @@ from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numba
+from numba.core import caching
 
 F = TypeVar("F", bound=Callable[..., Any])
 PACKAGES = ("solver", "pipeline", "data_synthetic", "reports")
@@ -59,15 +63,38 @@ def hash_of(file: Path) -> str:
     return digest.hexdigest()
 
 
+_Numbered: Any = caching.IndexDataCacheFile
+
+
+class _ByTypes(_Numbered):  # type: ignore[misc]
+    """Files of machine code that are named by the types, and written before the index names them."""
+
+    def __init__(self, numbered: Any, stamp: str) -> None:
+        super().__init__(numbered._cache_path, numbered._index_name.removesuffix(".nbi"), stamp)
+        # the version is compared before the index is unpickled, which fails where a class in it has moved since
+        self._version: str = f"{numba.__version__} {stamp} by types"
+
+    def save(self, key: tuple[Any, ...], data: Any) -> None:
+        """Keep what was compiled for a key: types, processor, hashes of the function's own code."""
+        types = hashlib.sha256(repr(key[:2]).encode()).digest()
+        name = self._data_name(int.from_bytes(types[:5]))
+        self._save_data(name, (key, data))
+        self._save_index(self._load_index() | {key: name})
+
+    def load(self, key: tuple[Any, ...]) -> Any:
+        """What was kept for a key; None where there is none, or that of another one."""
+        whose, data = super().load(key) or (None, None)
+        return data if whose == key else None
+
+
 def on_disk(**options: Any) -> Callable[[F], F]:
     """``numba.njit(**options)`` whose machine code is kept on disk for as long as no source behind it changes."""
 
     def decorate(function: F) -> F:
         compiled = numba.njit(cache=True, **options)(function)
         if hasattr(compiled, "_cache"):  # a plain function where NUMBA_DISABLE_JIT is set
-            index, stamp = compiled._cache._cache_file, hash_of(Path(function.__code__.co_filename))
-            # the version is compared before the index is unpickled, which fails where a class in it has moved since
-            index._version, index._source_stamp = f"{index._version} {stamp}", stamp
+            stamp = hash_of(Path(function.__code__.co_filename))
+            compiled._cache._cache_file = _ByTypes(compiled._cache._cache_file, stamp)
         return cast(F, compiled)
 
     return decorate

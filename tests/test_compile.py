@@ -6,9 +6,11 @@ import os
 import re
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
 
 import pytest
+from numba.core.caching import IndexDataCacheFile
 
 from solver._compile import sources_of
 
@@ -50,6 +52,29 @@ def test_an_edited_callee_is_compiled_again(package: str, tmp_path: Path) -> Non
     path.write_text(kernel.format(imports="", name="callee", value=2), encoding="utf-8")
     os.utime(path, ns=(state.st_atime_ns, state.st_mtime_ns))
     assert called(tmp_path, package) == "2"
+
+
+@pytest.mark.parametrize("package", COPIES)
+def test_two_processes_that_compile_at_one_time_do_not_mix_their_code(package: str, tmp_path: Path) -> None:
+    """Both took the number 1, and one's types were answered with the other's code ever after: a segmentation fault."""
+    kept = import_module(f"{package}._compile")._ByTypes
+    numbered = IndexDataCacheFile(str(tmp_path), "function", "stamp")
+    one, two = (kept(numbered, "stamp") for _ in range(2))
+    first, second = ((types, ("cpu",), ("code", "")) for types in ("float32", "int16"))
+    save, two._load_index = one._save_data, dict
+
+    def meanwhile(*args: object) -> None:
+        two.save(second, "code for int16")
+        save(*args)
+
+    one._save_data = meanwhile
+    one.save(first, "code for float32")
+    third = kept(numbered, "stamp")
+    assert third.load(first) == "code for float32"
+    assert third.load(second) in (None, "code for int16")
+    path = Path(third._data_path(third._load_index()[first]))
+    third._save_data(path.name, (second, "code for int16"))
+    assert third.load(first) is None, "of another key, whatever its name"
 
 
 def called(folder: Path, package: str) -> str:
