@@ -18,7 +18,7 @@ from pipeline.trace import explain, trace
 from pipeline.trace.attempt import EntryPose
 from pipeline.trace.config import TraceConfig
 from pipeline.trace.ends import sharpest_turn_deg
-from pipeline.trace.onward import seen_outside
+from pipeline.trace.outside import seen_outside
 from pipeline.trace.profile import Steps
 from pipeline.trace.reach import end_range
 from pipeline.trace.section import carried
@@ -279,26 +279,41 @@ def test_a_scanner_that_is_sharper_across_its_axis_makes_no_pair_of_one_wire(rat
         assert "out of round" not in curve.note
 
 
+def leaving(seed, leaves_mm, angle_deg):
+    """A wire whose last part leads out of the vessel through its wall."""
+    rng = np.random.default_rng([seed, 9])
+    draft = Draft(rng, wire_radius=0.2)
+    last = len(draft.path) - round(leaves_mm / 0.05)
+    along = draft.path[last] - draft.path[last - 10]
+    along /= np.linalg.norm(along)
+    across = np.cross(along, rng.normal(size=3))
+    across /= np.linalg.norm(across)
+    out = np.cos(np.radians(angle_deg)) * along + np.sin(np.radians(angle_deg)) * across
+    way = draft.path[last] + np.linspace(0.0, leaves_mm + 2.0, 60)[6:, None] * out
+    draft.path = even(np.concatenate([draft.path[20 : last - 10 : 10], way]), 0.05)
+    draft.opacity = np.ones(len(draft.path))
+    return draft
+
+
 @pytest.mark.parametrize(("leaves_mm", "angle_deg"), [(2.0, 80.0), (5.0, 80.0)])
 def test_a_wire_that_leaves_the_lumen_through_its_wall_is_not_cut_there(leaves_mm, angle_deg):
     """Cut where grey is no longer read, four voxels outside: ok, 2 to 27 voxels short, a tip known to 0.04 mm."""
     for seed in (20, 21):
-        rng = np.random.default_rng([seed, 9])
-        draft = Draft(rng, wire_radius=0.2)
-        last = len(draft.path) - round(leaves_mm / 0.05)
-        along = draft.path[last] - draft.path[last - 10]
-        along /= np.linalg.norm(along)
-        across = np.cross(along, rng.normal(size=3))
-        across /= np.linalg.norm(across)
-        out = np.cos(np.radians(angle_deg)) * along + np.sin(np.radians(angle_deg)) * across
-        way = draft.path[last] + np.linspace(0.0, leaves_mm + 2.0, 60)[6:, None] * out
-        draft.path = even(np.concatenate([draft.path[20 : last - 10 : 10], way]), 0.05)
-        draft.opacity = np.ones(len(draft.path))
-        scene = draft.scan(16)
+        scene = leaving(seed, leaves_mm, angle_deg).scan(16)
         lumen = segment(scene.reference, scene.entry[None])
         curve = trace(scene.frame, lumen, scene.entry, scene.direction, reference=scene.reference)
         short = np.linalg.norm(curve.points_mm[-1] - scene.wire[-1]) if len(curve.points_mm) else np.inf
         assert curve.status is not FrameStatus.OK or short < 1.5 * scene.voxel
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_wire_that_leaves_the_lumen_is_no_thin_vessel_of_a_frame_without_reference(seed):
+    """In tissue it is as bright as contrast medium, and counted as lumen: cut where it leaves, 4 mm short, and ok."""
+    scene = leaving(seed, 3.0, 80.0).scan(16, reference=False)
+    lumen = segment(scene.frame, scene.entry[None], wire_radius_mm=scene.wire_radius)
+    curve = trace(scene.frame, lumen, scene.entry, scene.direction)
+    assert curve.status is FrameStatus.TRACE_LEFT_LUMEN
+    assert "leads on through tissue" in curve.note
 
 
 @pytest.mark.parametrize("step", [1.0, 1.3])
