@@ -328,6 +328,19 @@ def test_scans_in_coarse_steps_of_grey_are_no_copies(step):
     assert "to the last bit" not in curve.note
 
 
+@pytest.mark.parametrize(("seed", "lower"), [(0, 100), (1, 200)])
+def test_scans_whose_negative_grey_is_cut_off_at_0_are_no_copies(seed, lower):
+    """Half of tissue about 0 is 0 in both: all were refused as copies, and the medium's level was off by a sixth."""
+    scene = Draft(np.random.default_rng([seed, 77])).scan(16)
+    frame, reference = (
+        replace(v, values=np.maximum(v.values.astype(int) - lower, 0).astype(np.uint16))
+        for v in (scene.frame, scene.reference)
+    )
+    curve = trace(frame, segment(reference, scene.entry[None]), scene.entry, scene.direction, reference=reference)
+    assert curve.status is FrameStatus.OK, curve.note
+    assert curve.levels["gain"] == 1.0
+
+
 @pytest.mark.parametrize("seed", [1, 4, 2])
 def test_a_frame_of_which_a_part_is_the_reference_is_no_scan_of_the_wire(seed):
     """The wire was cut where the copy began, by half of it, ok; a whole frame is as before."""
