@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from scipy import ndimage
-from scipy.special import ndtr
+from scipy.special import expit, ndtr
 
 from pipeline.arrays.spare import Spare
 from pipeline.model import Volume
@@ -314,6 +314,21 @@ def test_a_wire_that_leaves_the_lumen_is_no_thin_vessel_of_a_frame_without_refer
     curve = trace(scene.frame, lumen, scene.entry, scene.direction)
     assert curve.status is FrameStatus.TRACE_LEFT_LUMEN
     assert "leads on through tissue" in curve.note
+
+
+@pytest.mark.parametrize(("seed", "thinner", "about_mm"), [(4, 0.9, 2.0), (1, 0.6, 2.0), (0, 0.0, 2.0)])
+def test_a_tip_in_medium_that_is_washed_out_is_not_seen(seed, thinner, about_mm):
+    """As dark as the reference's medium, it was cut off: 3 to 5 voxels short, ok, at a sigma of 0.2 voxel."""
+    draft = Draft(np.random.default_rng([seed, 77]))
+    scene = draft.scan(16)
+    away = np.linalg.norm(scene.frame.to_mm(np.argwhere(np.ones(scene.frame.shape))) - scene.wire[-1], axis=1)
+    medium = (scene.reference.values - 100.0) * expit((about_mm - away) / 0.3).reshape(scene.frame.shape)
+    frame = replace(scene.frame, values=(scene.frame.values - thinner * medium).astype(np.float32))
+    lumen = segment(scene.reference, scene.entry[None])
+    curve = trace(frame, lumen, scene.entry, scene.direction, reference=scene.reference)
+    assert (curve.status is FrameStatus.OK) == (thinner == 0.0), curve.note
+    if thinner == 0.6:
+        assert "contrast medium about the curve's end that is darker than the reference's" in curve.note
 
 
 @pytest.mark.parametrize("step", [1.0, 1.3])
