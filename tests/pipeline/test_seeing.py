@@ -227,7 +227,7 @@ def test_the_wall_lies_half_way_to_the_local_level(case):
     assert row.wall < 0.2, "voxel; 0.9 to 1.9 with one level for the whole vessel"
 
 
-@pytest.mark.parametrize(("voxels", "pitch_mm"), [(1.25, 8.0), (1.5, 6.0), (2.0, 12.0)])
+@pytest.mark.parametrize(("voxels", "pitch_mm"), [(1.25, 8.0), (1.5, 6.0), (2.0, 12.0), (1.3, 4.0), (1.3, 3.0)])
 def test_two_wires_turned_about_each_other_are_not_one(voxels, pitch_mm):
     """Traced midway, ok, 0.6 to 1.1 voxel off at a claimed 0.06 to 0.2: which way they lie apart was averaged away."""
     draft = Draft(np.random.default_rng(3), radius=2.2, wire_radius=0.18, room=0.9)
