@@ -38,4 +38,4 @@ def copied_share(grey: Array, still: Array, runs: NDArray[np.int64]) -> float:
 
 def _at_an_end(grey: Array, still: Array) -> NDArray[np.bool_]:
     """Which voxels have the least grey of either scan (n,), or the most."""
-    return np.logical_or.reduce([one == end for one in (grey, still) for end in (one.min(), one.max())])
+    return np.asarray(np.any([one == end for one in (grey, still) for end in (one.min(), one.max())], axis=0))
