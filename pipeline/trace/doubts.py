@@ -9,6 +9,7 @@ from pipeline.arrays.jets import gaussian_taps, smooth_voxels
 from pipeline.arrays.polyline import tip_tangent
 from pipeline.model import Curve
 from pipeline.status import FrameStatus
+from pipeline.trace.ahead import WASHED, washed_out
 from pipeline.trace.attempt import ENTRY_REACH_MM, Attempt, dense
 from pipeline.trace.onward import FAINTEST, GOES_ON, TANGENT_MM
 from pipeline.trace.subtraction import CREST_VOXELS, Subtraction
@@ -86,6 +87,22 @@ def ends_in_nothing(image: Subtraction, tube: Tube, curve: Curve) -> Curve:
     got, allowed = f"a faint line {GOES_ON}", "a tip with nothing beyond it"
     do = "look whether the wire's end is fainter than the rest; scan with more dose"
     return replace(curve, status=FrameStatus.TRACE_AMBIGUOUS, note=note_of(got, allowed, do))
+
+
+def unwashed(image: Subtraction, tube: Tube, curve: Curve) -> Curve:
+    """The curve, or the same as ambiguous where the contrast medium about its end is so thin that a wire is not seen.
+
+    image : before its background is levelled.
+    """
+    if curve.status is not FrameStatus.OK:
+        return curve
+    darker = washed_out(image, dense(tube, 0.5 * image.voxel), tube.sigma)
+    if darker == 0.0:
+        return curve
+    got = f"contrast medium about the curve's end that is darker than the reference's by {darker:.2f} of the wire"
+    do = "look whether the wire goes on in thin contrast medium; fill the vessel evenly and scan again"
+    note = note_of(got, f"{WASHED:g} at most", do)
+    return replace(curve, status=FrameStatus.TRACE_AMBIGUOUS, note=note)
 
 
 def doubted(image: Subtraction, attempt: Attempt, curve: Curve) -> Curve:

@@ -9,7 +9,8 @@ from pipeline.model import Array
 from pipeline.status import FrameStatus
 from pipeline.trace.ahead import dark_ahead, hidden_ahead
 from pipeline.trace.attempt import Attempt
-from pipeline.trace.onward import GOES_ON, seen_outside
+from pipeline.trace.onward import GOES_ON
+from pipeline.trace.outside import seen_outside, thread_outside
 from pipeline.trace.reach import end_range
 from pipeline.trace.section import STRETCH_MM, fills_vessel
 from pipeline.trace.subtraction import Subtraction
@@ -148,7 +149,7 @@ def of_the_ends(
     )  # fmt: skip
 
 
-def of_the_lumen(image: Subtraction, points: Array) -> tuple[Objection, ...]:
+def of_the_lumen(image: Subtraction, attempt: Attempt, points: Array) -> tuple[Objection, ...]:
     """Why a curve (n, 3) may end where the lumen does, and not the wire."""
     beyond_wall = float(image.depth_at(points[-1:])[0]) / image.voxel
     return (
@@ -160,6 +161,10 @@ def of_the_lumen(image: Subtraction, points: Array) -> tuple[Objection, ...]:
          f"a curve that ends {beyond_wall * image.voxel:.1f} mm outside the lumen, at {_named(image, points[-1])} mm, "
          "where no more of the scan is read", f"{ENDS_OUTSIDE_VOXELS * image.voxel:.1f} mm at most",
          "look whether the wire leaves the vessel there, or the vessel goes on (segment.threshold, lumen)"),
+        (thread_outside(image, points, attempt.tube.sigma), FrameStatus.TRACE_LEFT_LUMEN,
+         f"a line as thin and as bright as the wire that leads on through tissue from {_named(image, points[-1])} mm, "
+         "where the curve ends", "a lumen that holds the tip",
+         "look whether the wire leaves the vessel there; if that is a thin vessel, give a reference scan without wire"),
     )  # fmt: skip
 
 

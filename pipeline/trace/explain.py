@@ -25,7 +25,7 @@ from pipeline.trace.attempt import (
 )
 from pipeline.trace.config import TraceConfig
 from pipeline.trace.crests import SEED_SIGMAS, STRICT_BEND
-from pipeline.trace.doubts import doubted, no_wire
+from pipeline.trace.doubts import doubted, no_wire, unwashed
 from pipeline.trace.noise import inflation
 from pipeline.trace.subtraction import Subtraction, levelled
 from pipeline.trace.tube import DIM_END, Tube, point_sigmas
@@ -250,7 +250,7 @@ def explained(image: Subtraction, entry: EntryPose, previous: Curve | None, conf
     best = best_of(seen, entry, previous, config)
     if best is None:
         return no_wire(image)
-    attempt = best.attempt
+    attempt, as_seen = best.attempt, image
     if image.modelled:
         # the lumen's own grey under the wire is taken from beside it, and the fit done again
         image = levelled(image, dense(attempt.tube, image.voxel), attempt.tube.sigma)
@@ -258,4 +258,4 @@ def explained(image: Subtraction, entry: EntryPose, previous: Curve | None, conf
     attempt = bent(image, attempt, entry)
     if attempt is not best.attempt:
         best = _agreed(best, _read_off(image, attempt, entry)[0], modelled=image.modelled)
-    return doubted(image, best.attempt, _curve(image, best))
+    return doubted(image, best.attempt, unwashed(as_seen, best.attempt.tube, _curve(image, best)))

@@ -29,6 +29,12 @@ voxels: a third of a noise (a lost intercept, a scanner that is not calibrated) 
 SAME_NOISE = 0.5
 """The same in noises of a voxel, as an estimate from the darkest tenth may be off by that."""
 
+CUT_OFF = 0.1
+"""Share of the voxels outside the lumen that have the frame's least grey, from which noise is cut off there: exports
+without a sign end at 0, and tissue about 0 has half of its voxels there."""
+DARKEST_OF_ALL = 0.02
+"""Share of the lumen's voxels from which on to DARKEST noise is read then: no wire is in them."""
+
 
 def _difference(rest: Array, full: Array, deep: NDArray[np.bool_], out: NDArray[np.bool_], noise: float) -> float:
     """By how much the contrast differs, as a share of it; 0 for the same.
@@ -63,6 +69,9 @@ def matched(
     seen = frame.values[tuple((region.sample + region.corner).T)].astype(float)
     rest = seen - still
     noise = spread(rest[out])
+    if np.mean(seen[out] == seen.min()) > CUT_OFF:
+        # cut off, noise is half as large there, and its median is not its mean, which the smoothed reference shows
+        noise, offset = _darker(rest[deep]), float(np.median(rest[out]))
     more = _difference(rest, background[at] - low, deep, out, noise)
     sure = max(SAME_OFFSET, SURE_OFFSET / float(np.sqrt(np.count_nonzero(out))))
     apart = abs(offset) > sure * noise
@@ -71,3 +80,9 @@ def matched(
         medium = np.float32(more) * (background[everywhere] - np.float32(low))
         grey[everywhere] -= np.float32(offset) + medium.astype(np.float32)
     return 1.0 + more
+
+
+def _darker(rest: Array) -> float:
+    """Noise of what is left (n,) in a lumen, by its dark side, to which no wire adds."""
+    low, high = np.quantile(rest, (DARKEST_OF_ALL, DARKEST))
+    return float((high - low) / (ndtri(DARKEST) - ndtri(DARKEST_OF_ALL)))

@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from pipeline.arrays.jets import Blurred, values_at
 from pipeline.arrays.polyline import tip_tangent
 from pipeline.model import Array
 from pipeline.trace.crests import Tracklet, find_crests
@@ -45,18 +44,6 @@ RAY_SURE = 4.5
 """Standard deviations of its mean, or its first half's, from which the brightest of a hundred is no noise."""
 OUTER_SURE = 2.5
 """The same for the mean of its outer half."""
-OUTSIDE_CONE = 0.85
-"""Least cosine between the wire's end and the way on which the lumen may have ended too early."""
-OUTSIDE_VOXELS = 1.5
-"""Distance from the wall at which its blur is gone."""
-BRIGHT = 0.5
-"""Share of the vessel's contrast from which something outside the lumen is no tissue."""
-BONE = 1.25
-"""The same from which it is bone, or metal: ``segment.levels.BRIGHTER``."""
-FEW = 0.1
-"""Share of the ways below which what is bright on them is no vessel but the edge of bone, or a wire straight ahead."""
-AHEAD_RAD = 0.15
-"""Angle to the wire's end up to which a way is straight ahead: the nearest of ``cone``."""
 MOST_RAYS = 24
 """Most straight pieces that are followed."""
 BESIDE_VOXELS = 2.0
@@ -127,35 +114,6 @@ def _ray(image: Subtraction, start: Array, heading: Array, least: float) -> Arra
         if mean[best] * np.sqrt(stop / INDEPENDENT_VOXELS) > RAY_SURE * noise and mean[best] > least and ends[best]:
             return np.asarray(start + s[stop - 1] * directions[best])
     return None
-
-
-def seen_outside(image: Subtraction, line: Array) -> bool:
-    """Whether the scan shows something as bright as the vessel, or a wire, just beyond the tip and outside the lumen.
-
-    Then it is the lumen that ends there, not the wire. Read in the scan itself, as nothing else is known out there.
-    """
-    h, tip = image.voxel, line[-1]
-    heading = tip_tangent(line, TANGENT_MM)
-    s = np.arange(1.0, RAY_MM, h)
-    directions = cone(heading, float(np.arccos(CONE)), RAY_STEP)
-    directions = directions[directions @ heading > OUTSIDE_CONE]
-    points = (tip + s[:, None, None] * directions).reshape(-1, 3)
-    depth = image.depth_at(points).reshape(len(s), -1)
-    out = np.mean(depth > OUTSIDE_VOXELS * h, axis=0) > 0.5
-    if not out.any():
-        return False
-    index = image.in_scan(points)
-    field = Blurred(
-        image.scan.values, np.asarray(image.scan.spacing_mm), CREST_VOXELS * float(image.scan.spacing_mm.min())
-    )
-    grey = values_at(field, index * image.scan.spacing_mm).reshape(len(s), -1)
-    inside, outside = image.wall_greys
-    if not inside > outside:
-        return False
-    beyond = np.ma.masked_array((grey - outside) / (inside - outside), depth <= OUTSIDE_VOXELS * h)[:, out]
-    bright, bone = beyond.min(axis=0) > BRIGHT, beyond.max(axis=0) > BONE
-    ahead = directions[out] @ heading > np.cos(AHEAD_RAD)
-    return bool(np.mean(bright & ~bone) > FEW or (np.any(bright & ahead) and np.mean(bright) < FEW))
 
 
 def _walked(image: Subtraction, line: Array, least: float) -> Array:

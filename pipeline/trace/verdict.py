@@ -169,7 +169,7 @@ def judge(image: Subtraction, attempt: Attempt, points: Array, bridged: NDArray[
     fitted = as_fitted(image, attempt.tube, points)
     pair = 0.0 if image.thick_slices else _pair(image, section, fitted, points, length_mm)
     objections += of_a_pair(pair, attempt)
-    objections += of_the_ends(image, attempt, points, length_mm, folded=folded) + of_the_lumen(image, points)
+    objections += of_the_ends(image, attempt, points, length_mm, folded=folded) + of_the_lumen(image, attempt, points)
     objections += of_its_width(image, attempt, points, (read, fitted), folded=folded)
     objections += of_the_whole(image, attempt, points, length_mm)
     first = next(((status, note_of(*why)) for holds, status, *why in objections if holds), (FrameStatus.OK, ""))

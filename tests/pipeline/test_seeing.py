@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from scipy import ndimage
-from scipy.special import ndtr
+from scipy.special import expit, ndtr
 
 from pipeline.arrays.spare import Spare
 from pipeline.model import Volume
@@ -18,7 +18,7 @@ from pipeline.trace import explain, trace
 from pipeline.trace.attempt import EntryPose
 from pipeline.trace.config import TraceConfig
 from pipeline.trace.ends import sharpest_turn_deg
-from pipeline.trace.onward import seen_outside
+from pipeline.trace.outside import seen_outside
 from pipeline.trace.profile import Steps
 from pipeline.trace.reach import end_range
 from pipeline.trace.section import carried
@@ -146,7 +146,7 @@ def test_the_wall_lies_half_way_to_the_local_level(case):
     assert row.wall < 0.2, "voxel; 0.9 to 1.9 with one level for the whole vessel"
 
 
-@pytest.mark.parametrize(("voxels", "pitch_mm"), [(1.25, 8.0), (1.5, 6.0), (2.0, 12.0)])
+@pytest.mark.parametrize(("voxels", "pitch_mm"), [(1.25, 8.0), (1.5, 6.0), (2.0, 12.0), (1.3, 4.0), (1.3, 3.0)])
 def test_two_wires_turned_about_each_other_are_not_one(voxels, pitch_mm):
     """Traced midway, ok, 0.6 to 1.1 voxel off at a claimed 0.06 to 0.2: which way they lie apart was averaged away."""
     draft = Draft(np.random.default_rng(3), radius=2.2, wire_radius=0.18, room=0.9)
@@ -198,26 +198,56 @@ def test_a_scanner_that_is_sharper_across_its_axis_makes_no_pair_of_one_wire(rat
         assert "out of round" not in curve.note
 
 
+def leaving(seed, leaves_mm, angle_deg):
+    """A wire whose last part leads out of the vessel through its wall."""
+    rng = np.random.default_rng([seed, 9])
+    draft = Draft(rng, wire_radius=0.2)
+    last = len(draft.path) - round(leaves_mm / 0.05)
+    along = draft.path[last] - draft.path[last - 10]
+    along /= np.linalg.norm(along)
+    across = np.cross(along, rng.normal(size=3))
+    across /= np.linalg.norm(across)
+    out = np.cos(np.radians(angle_deg)) * along + np.sin(np.radians(angle_deg)) * across
+    way = draft.path[last] + np.linspace(0.0, leaves_mm + 2.0, 60)[6:, None] * out
+    draft.path = even(np.concatenate([draft.path[20 : last - 10 : 10], way]), 0.05)
+    draft.opacity = np.ones(len(draft.path))
+    return draft
+
+
 @pytest.mark.parametrize(("leaves_mm", "angle_deg"), [(2.0, 80.0), (5.0, 80.0)])
 def test_a_wire_that_leaves_the_lumen_through_its_wall_is_not_cut_there(leaves_mm, angle_deg):
     """Cut where grey is no longer read, four voxels outside: ok, 2 to 27 voxels short, a tip known to 0.04 mm."""
     for seed in (20, 21):
-        rng = np.random.default_rng([seed, 9])
-        draft = Draft(rng, wire_radius=0.2)
-        last = len(draft.path) - round(leaves_mm / 0.05)
-        along = draft.path[last] - draft.path[last - 10]
-        along /= np.linalg.norm(along)
-        across = np.cross(along, rng.normal(size=3))
-        across /= np.linalg.norm(across)
-        out = np.cos(np.radians(angle_deg)) * along + np.sin(np.radians(angle_deg)) * across
-        way = draft.path[last] + np.linspace(0.0, leaves_mm + 2.0, 60)[6:, None] * out
-        draft.path = even(np.concatenate([draft.path[20 : last - 10 : 10], way]), 0.05)
-        draft.opacity = np.ones(len(draft.path))
-        scene = draft.scan(16)
+        scene = leaving(seed, leaves_mm, angle_deg).scan(16)
         lumen = segment(scene.reference, scene.entry[None])
         curve = trace(scene.frame, lumen, scene.entry, scene.direction, reference=scene.reference)
         short = np.linalg.norm(curve.points_mm[-1] - scene.wire[-1]) if len(curve.points_mm) else np.inf
         assert curve.status is not FrameStatus.OK or short < 1.5 * scene.voxel
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_wire_that_leaves_the_lumen_is_no_thin_vessel_of_a_frame_without_reference(seed):
+    """In tissue it is as bright as contrast medium, and counted as lumen: cut where it leaves, 4 mm short, and ok."""
+    scene = leaving(seed, 3.0, 80.0).scan(16, reference=False)
+    lumen = segment(scene.frame, scene.entry[None], wire_radius_mm=scene.wire_radius)
+    curve = trace(scene.frame, lumen, scene.entry, scene.direction)
+    assert curve.status is FrameStatus.TRACE_LEFT_LUMEN
+    assert "leads on through tissue" in curve.note
+
+
+@pytest.mark.parametrize(("seed", "thinner", "about_mm"), [(4, 0.9, 2.0), (1, 0.6, 2.0), (0, 0.0, 2.0)])
+def test_a_tip_in_medium_that_is_washed_out_is_not_seen(seed, thinner, about_mm):
+    """As dark as the reference's medium, it was cut off: 3 to 5 voxels short, ok, at a sigma of 0.2 voxel."""
+    draft = Draft(np.random.default_rng([seed, 77]))
+    scene = draft.scan(16)
+    away = np.linalg.norm(scene.frame.to_mm(np.argwhere(np.ones(scene.frame.shape))) - scene.wire[-1], axis=1)
+    medium = (scene.reference.values - 100.0) * expit((about_mm - away) / 0.3).reshape(scene.frame.shape)
+    frame = replace(scene.frame, values=(scene.frame.values - thinner * medium).astype(np.float32))
+    lumen = segment(scene.reference, scene.entry[None])
+    curve = trace(frame, lumen, scene.entry, scene.direction, reference=scene.reference)
+    assert (curve.status is FrameStatus.OK) == (thinner == 0.0), curve.note
+    if thinner == 0.6:
+        assert "contrast medium about the curve's end that is darker than the reference's" in curve.note
 
 
 @pytest.mark.parametrize("step", [1.0, 1.3])
@@ -230,6 +260,19 @@ def test_scans_in_coarse_steps_of_grey_are_no_copies(step):
     )
     curve = trace(frame, segment(reference, scene.entry[None]), scene.entry, scene.direction, reference=reference)
     assert "to the last bit" not in curve.note
+
+
+@pytest.mark.parametrize(("seed", "lower"), [(0, 100), (1, 200)])
+def test_scans_whose_negative_grey_is_cut_off_at_0_are_no_copies(seed, lower):
+    """Half of tissue about 0 is 0 in both: all were refused as copies, and the medium's level was off by a sixth."""
+    scene = Draft(np.random.default_rng([seed, 77])).scan(16)
+    frame, reference = (
+        replace(v, values=np.maximum(v.values.astype(int) - lower, 0).astype(np.uint16))
+        for v in (scene.frame, scene.reference)
+    )
+    curve = trace(frame, segment(reference, scene.entry[None]), scene.entry, scene.direction, reference=reference)
+    assert curve.status is FrameStatus.OK, curve.note
+    assert curve.levels["gain"] == 1.0
 
 
 @pytest.mark.parametrize("seed", [1, 4, 2])
