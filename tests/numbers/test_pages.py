@@ -8,6 +8,7 @@ from tests.numbers.kept import different
 from tests.numbers.parts import PARTS
 
 SCENES, RELATIVE = PARTS["pages"]
+pytestmark = pytest.mark.slow  # tests/reports looks at pages each time
 
 
 @pytest.mark.parametrize("name", SCENES)
