@@ -1,7 +1,5 @@
 """Wires that users bring (.csv, .vtp, .mrk.json), and the true ones of a synthetic study (truth.json). Out: LPS mm."""
 
-import csv
-import io
 from pathlib import Path
 from typing import Any
 
@@ -10,14 +8,13 @@ from numpy.typing import NDArray
 
 from pipeline.load.chain import one_chain
 from pipeline.load.geometry import refused, unusable
-from pipeline.load.guard import reachable, read_json, read_text, told
+from pipeline.load.guard import reachable, read_json, told
 from pipeline.load.outside import millimetres, to_number
 from pipeline.load.stated import stated_in
 from pipeline.load.surfaces import RAS_TO_LPS, read_vtp
+from pipeline.load.tables import rows_of
 from pipeline.model import Array, Curve
 
-CURVE_BYTES = 16 * 2**20
-"""Longest table of a curve: 200,000 points."""
 _NAMES = (("x_mm", "y_mm", "z_mm"), ("x", "y", "z"), ("points:0", "points:1", "points:2"))
 """Of the columns of points, in small letters; the last are ParaView's."""
 
@@ -79,11 +76,7 @@ def read_markups_curve(path: Path) -> NDArray[np.float64]:
 
 def read_csv_points(path: Path) -> NDArray[np.float64]:
     """Points (n, 3), LPS mm: columns x_mm, y_mm, z_mm (or x, y, z) by name, else the three of a bare table."""
-    try:
-        lines = csv.reader(io.StringIO(read_text(path, CURVE_BYTES), newline=""))
-        rows = [r for r in lines if r and not r[0].lstrip().startswith("#")]
-    except csv.Error:
-        raise refused(path, "a line that is no CSV", "columns x_mm, y_mm, z_mm of numbers", "save it again") from None
+    rows, _ = rows_of(path)
     if not rows:
         raise refused(path, "an empty file", "points", "columns x_mm, y_mm, z_mm")
     head = [c.strip().lower() for c in rows[0]]
