@@ -10,11 +10,12 @@ from scipy import ndimage
 
 from pipeline.load import SUFFIXES, load, read_header
 from pipeline.load.config import LoadConfig
-from pipeline.load.geometry import unusable
+from pipeline.load.geometry import LoadError, unusable
 from pipeline.load.guard import is_folder
 from pipeline.load.order import natural_key
 from pipeline.load.slices import is_dicom, is_multiframe
 from pipeline.model import Array, Volume, Wall
+from pipeline.study.same_grid import apart
 
 NO_REFERENCE = "reference: none found (a file named reference.*); --reference names a scan without the wire"
 REFERENCE_NAMES = ("reference", "ref", "wire_free", "nowire", "empty")
@@ -168,12 +169,20 @@ def _ends(points: Array) -> Array:
 def _stated_or_seen(
     entry: Array | None, direction: Array | None, frames: Sequence[Path], reference: Path | None, config: LoadConfig
 ) -> tuple[Array, Array, str]:
-    """Entry and direction, each as the frames show it where it is not stated; a sentence on what is not."""
+    """Entry and direction, each as the frames show it where it is not stated; a sentence on what is not.
+
+    LoadError where the scans that are subtracted for it do not lie on one grid.
+    """
     if entry is not None and direction is not None:
         return entry, direction, ""
 
+    looked_at = dict.fromkeys([*filter(None, [reference]), frames[0], *frames[-1:] * (reference is not None)])
+    headers = {path: read_header(path, config) for path in looked_at}
+    if problems := apart([*headers.values()]):
+        raise LoadError(problems[0])
+
     def loaded(path: Path) -> Volume:
-        return load(read_header(path, config), config=config)
+        return load(headers[path], config=config)
 
     empty, last = loaded(reference) if reference else None, NOWHERE
     if empty is not None and len(frames) > 1:
