@@ -176,7 +176,7 @@ def _stated_or_seen(
     if entry is not None and direction is not None:
         return entry, direction, ""
 
-    looked_at = dict.fromkeys([*filter(None, [reference]), frames[0], *frames[-1:] * (reference is not None)])
+    looked_at = [reference, frames[0], frames[-1]] if reference else frames[:1]
     headers = {path: read_header(path, config) for path in looked_at}
     if problems := apart([*headers.values()]):
         raise LoadError(problems[0])
