@@ -303,6 +303,21 @@ def test_what_speaks_of_ras_and_does_not_state_it_is_refused(tmp_path: Path, lin
             read_wires([Source(tmp_path / "a.csv")], 1)
 
 
+def test_one_table_of_all_frames_is_told_how_to_be_split(tmp_path: Path) -> None:
+    """ "got 1 files, all.csv to all.csv, for 6 frames"."""
+    with pytest.raises(LoadError, match=r"one table, all\.csv, for 6 frames: .* into wire_000\.csv to wire_005\.csv"):
+        read_wires([Source(tmp_path / "all.csv")], 6)
+
+
+@pytest.mark.parametrize("unit", ["m", "cm"])
+def test_columns_in_metres_are_not_to_be_renamed_to_mm(tmp_path: Path, unit: str) -> None:
+    text = f"x_{unit},y_{unit},z_{unit}\n1,2,3\n4,5,6\n"
+    (tmp_path / "a.csv").write_text(text, encoding="utf-8")
+    with pytest.raises(LoadError, match=f"columns in {unit}; expected x, y, z; .* '# unit: {unit}' above") as told:
+        read_curve(tmp_path / "a.csv")
+    assert "_mm" not in str(told.value)
+
+
 @pytest.mark.parametrize("head", [f"{BOM}x_mm,y_mm,z_mm", '"x_mm","y_mm","z_mm"'])
 def test_names_of_columns_say_lps_and_mm_as_excel_writes_them(tmp_path: Path, head: str) -> None:
     """Both were refused as wires of which nobody says the space."""
