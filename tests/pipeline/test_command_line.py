@@ -75,6 +75,12 @@ TOO_LONG = (
         ("run STUDY -o y --fail-if max_mm>1_0", "a limit in plain digits, as in"),  # was taken for 10
         ("run STUDY -o y --fail-if max_mm>\N{FULLWIDTH DIGIT ONE}", "a limit in plain digits, as in"),
         ("run STUDY -o y --fail-if case>1", "no number 'case'"),
+        (
+            "run STUDY -o y --fail-if strongest_null>1",
+            "in overall.csv: it is a text; numbers are rms_mm, tip_median_mm",
+        ),
+        ("run STUDY -o y --fail-if status>0", "frames_failed and those in docs/reference/columns.md"),
+        ("run STUDY -o y --fail-if tip_mm>9", "did you mean 'tip_median_mm'?"),
         ("init STUDY", "is there already"),
         ("init STUDY/none", "no such folder"),
         ("init STUDY/reference.mha", "this is a file; give a folder that holds scans"),
