@@ -95,6 +95,7 @@ TOO_LONG = (
         ("settings solver.segmnt_mm", "did you mean 'solver.segment_mm'?"),
         ("run", "missing: MANIFEST, -o; wireval run --help lists what there is"),
         ("run STUDY -o", "-o: its value is missing"),
+        ("cache --limit -1G", "--limit: its value is missing (one that begins with - is written --limit=-VALUE)"),
         ("run STUDY -o EMPTY", "an empty argument"),
         ("run STUDY -o y -j x", "-j 'x': expected a whole number"),
         ("run STUDY -o y -q -v", "-v and -q: give one of them"),
