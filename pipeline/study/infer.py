@@ -10,6 +10,7 @@ from scipy import ndimage
 
 from pipeline.load import SUFFIXES, load, read_header
 from pipeline.load.config import LoadConfig
+from pipeline.load.dicom import series_in
 from pipeline.load.geometry import LoadError, unusable
 from pipeline.load.guard import is_folder
 from pipeline.load.order import natural_key
@@ -83,6 +84,17 @@ def _deeper(folder: Path) -> str:
         f"; further down are scans: {names}; move each frame's own folder or file up into "
         f"{folder.resolve().name}/frames, or list them in a manifest (frames = [...])"
     )
+
+
+def _loose(folder: Path) -> str:
+    """A hint where slices lie in frames/ itself, which holds a folder or a file for each frame; empty without."""
+    frames = folder / "frames"
+    if not is_folder(frames) or not any(_is_dicom(p) for p in frames.iterdir()):
+        return ""
+    series, _ = series_in(frames)
+    count, slices = len(series), sum(map(len, series.values()))
+    of = "one series" if count == 1 else f"{count} series"
+    return f"; frames/ holds {slices} slices of {of}: one folder a series, as in frames/0, frames/1" * bool(count)
 
 
 def looks_wire_free(path: Path) -> bool:
@@ -212,7 +224,7 @@ def infer_manifest(
     if not frames:
         allowed = f"files {', '.join(SUFFIXES)} or DICOM folders, here or in frames/"
         found = f"{reference.name} alone, a reference, and no frames" if reference else "no scans"
-        raise unusable(folder, f"found {found}; allowed: {allowed}{_deeper(folder)}")
+        raise unusable(folder, f"found {found}; allowed: {allowed}{_loose(folder) or _deeper(folder)}")
     seen = (
         f"frames: {len(frames)} scans in natural order, {frames[0].name} to {frames[-1].name}",
         f"reference: {reference.name}" if reference else NO_REFERENCE,
