@@ -31,7 +31,10 @@ WORDED: tuple[tuple[str, Callable[[re.Match[str]], str]], ...] = (
         r"argument (\S+): invalid choice: ('.*?') \(choose from (.*)\)",
         lambda m: f"{_short(m[1])} {m[2]}: allowed: {m[3]}",
     ),
-    (r"argument (\S+): expected one argument", lambda m: f"{_short(m[1])}: its value is missing"),
+    (
+        r"argument (\S+): expected one argument",
+        lambda m: f"{_short(m[1])}: its value is missing (one that begins with - is written {_short(m[1])}=-VALUE)",
+    ),
     (
         r"argument (\S+): not allowed with argument (\S+)",
         lambda m: f"{_short(m[1])} and {_short(m[2])}: give one of them",

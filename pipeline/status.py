@@ -91,10 +91,12 @@ class UsageError(InputError):
 def did_you_mean(key: str, allowed: Iterable[str]) -> str:
     """Sentence naming the nearest allowed key, whatever its capitals, or all of them.
 
-    A key that lacks nothing but the end of an allowed one, as its unit, is nearest to that.
+    A key that lacks nothing but the end of an allowed one, as its unit, is nearest to that, or ``_median`` before it.
     """
     names, low = sorted(allowed), key.lower()
     small = {name.lower(): name for name in names}
     longer = sorted((name for name in small if name.startswith(f"{low}_")), key=len)
-    close = [low] * (low in small) or longer or get_close_matches(low, small, n=1)
+    stem, _, unit = low.rpartition("_")
+    median = f"{stem}_median_{unit}"
+    close = [low] * (low in small) or [median] * (median in small) or longer or get_close_matches(low, small, n=1)
     return f"did you mean {small[close[0]]!r}?" if close else f"allowed: {', '.join(names)}"

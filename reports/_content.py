@@ -176,10 +176,23 @@ def _failed(summary: pd.DataFrame) -> "pd.Series[bool]":
 
 def cases(summary: pd.DataFrame, links: Mapping[str, str], worse: Iterable[str] = ()) -> Grid:
     """One row per case, linked to its page; those that failed are marked, and those that are worse than a guess."""
-    table = grid(summary, SUMMARY.shown("cases"), bad=_failed(summary) | summary["case"].isin(list(worse)))
+    table = grid(
+        summary, quoted_first(SUMMARY.shown("cases")), bad=_failed(summary) | summary["case"].isin(list(worse))
+    )
     for row, name in zip(table["rows"], summary["case"], strict=True):
         row["cells"][0]["link"] = links.get(name, "")
     return table
+
+
+QUOTED, BEFORE = ("skill_strongest", "strongest_null"), "distal10_rms_mm"
+
+
+def quoted_first(columns: Sequence[Column]) -> list[Column]:
+    """Columns of a table on a page, the number to quote before those that a narrow window cuts off."""
+    names = [column.name for column in columns]
+    at = names.index(BEFORE) if BEFORE in names else len(names)
+    moved = [column for column in columns[at:] if column.name in QUOTED]
+    return [*columns[:at], *moved, *(column for column in columns[at:] if column not in moved)]
 
 
 def grid(table: pd.DataFrame, columns: Sequence[Column], bad: Iterable[Any] | None = None, nothing: str = "") -> Grid:

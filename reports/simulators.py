@@ -110,7 +110,7 @@ def _one_table(rows: pd.DataFrame, copied: Container[str]) -> tuple[pd.DataFrame
     table = rows[rows["against"].isna()]
     table = table.assign(doubtful=_doubtful(table, copied)).sort_values(["doubtful", "rms_mm"], kind="stable")
     table = table.drop(columns="doubtful").reset_index(drop=True)
-    columns = list(SIMULATORS.shown("cases"))
+    columns = _content.quoted_first(SIMULATORS.shown("cases"))
     pairs = rows[rows["against"].notna()]
     for other in table["simulator"][table["simulator"].isin(pairs["against"])]:
         name = f"rms_ratio_to_{other}"

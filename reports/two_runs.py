@@ -44,6 +44,15 @@ def newly_void(first: Warned, second: Warned) -> str:
     return "" if copied_from_traces(first) else copied_from_traces(second)
 
 
+def _blank(table: pd.DataFrame) -> pd.DataFrame:
+    """A table whose missing whole numbers are printed as its other gaps are: pandas writes <NA> whatever is asked."""
+    out = table.copy()
+    for name in out:
+        if out[name].dtype.kind not in "iuf" or isinstance(out[name].dtype, pd.api.extensions.ExtensionDtype):
+            out[name] = out[name].astype(object).where(out[name].notna(), "")
+    return out
+
+
 def _words(text: str) -> str:
     return re.sub(r"# (frame|place|case|point|insertion)s?\b", r"# \1", re.sub(r"[-+]?\d[\d.e+-]*", "#", text))
 
@@ -122,7 +131,7 @@ class Verdict:
     def lines(self) -> list[str]:
         """For a terminal: what differs, the verdict, the worst frames, tables; and the verdict again at the end."""
         parts = [
-            f"{head}:\n{table.to_string(index=False, na_rep='', float_format='{:.4g}'.format)}\n"
+            f"{head}:\n{_blank(table).to_string(index=False, na_rep='', float_format='{:.4g}'.format)}\n"
             for head, table in self.tables().items()
             if len(table)
         ]

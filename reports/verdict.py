@@ -44,7 +44,8 @@ def verdict(statistics: Mapping[str, Any], simulator: str = "", doubt: Doubt = N
     sentence += f" From the true wire it lies {true} mm." * (true != NOTHING)
     sentence += _at_the_floor(statistics) + _beyond_inputs(statistics)
     again = f"But {TWINS} that was scanned again, and count as several: see the warnings." * bool(doubt.twins)
-    return " ".join(filter(None, (sentence, *remarks(statistics, simulator), _against(statistics), again)))
+    judged = tips_off(statistics), _against(statistics), _unknown_roll(statistics, simulator)
+    return " ".join(filter(None, (sentence, *judged, again)))
 
 
 FLOOR_SIGMAS = 1.4142
@@ -114,7 +115,7 @@ def _unknown_roll(statistics: Mapping[str, Any], simulator: str) -> str:
         mend = "check axes (LPS or RAS) and the roll that it was simulated with"
     elif _number(statistics.get("frames_fitted")) > 0:
         mend = "check axes (LPS or RAS) and the wire's tip; the roll was fitted on a frame: state it, or begin deeper"
-    return f"The wire is worse than with an unknown roll ({number(unknown)} mm): {mend}."
+    return f"With an unknown roll the wire lies nearer ({number(unknown)} mm): {mend}."
 
 
 def tips_off(statistics: Mapping[str, Any]) -> str:
@@ -220,11 +221,11 @@ def _against(statistics: Mapping[str, Any]) -> str:
     would = "it is not shown to be better" if least <= 0.0 else "it would be better"
     said = {
         TIPS_OFF: f"By rms_mm alone {would} ({unsure})",
-        WORSE: f"That is worse ({value})",
-        NO_BETTER: f"That is no better ({value})",
+        WORSE: f"The wire is worse ({value})",
+        NO_BETTER: f"The wire is no better ({value})",
         NOT_SHOWN: f"It is not shown to be better ({unsure})",
     }
-    how = said.get(standing(statistics), f"That is better ({value})")
+    how = said.get(standing(statistics), f"The wire is better ({value})")
     few = _few_insertions(statistics) if least <= 0.0 < skill else ""
     return " ".join(filter(None, (f"{how} than {rival}.", few, _of_frames(statistics))))
 

@@ -1,7 +1,5 @@
 """Wires that users bring (.csv, .vtp, .mrk.json), and the true ones of a synthetic study (truth.json). Out: LPS mm."""
 
-import csv
-import io
 from pathlib import Path
 from typing import Any
 
@@ -10,14 +8,13 @@ from numpy.typing import NDArray
 
 from pipeline.load.chain import one_chain
 from pipeline.load.geometry import refused, unusable
-from pipeline.load.guard import reachable, read_json, read_text, told
-from pipeline.load.outside import millimetres, to_number
+from pipeline.load.guard import reachable, read_json, told
+from pipeline.load.outside import UNITS_MM, millimetres, to_number
 from pipeline.load.stated import stated_in
 from pipeline.load.surfaces import RAS_TO_LPS, read_vtp
+from pipeline.load.tables import rows_of
 from pipeline.model import Array, Curve
 
-CURVE_BYTES = 16 * 2**20
-"""Longest table of a curve: 200,000 points."""
 _NAMES = (("x_mm", "y_mm", "z_mm"), ("x", "y", "z"), ("points:0", "points:1", "points:2"))
 """Of the columns of points, in small letters; the last are ParaView's."""
 
@@ -79,11 +76,7 @@ def read_markups_curve(path: Path) -> NDArray[np.float64]:
 
 def read_csv_points(path: Path) -> NDArray[np.float64]:
     """Points (n, 3), LPS mm: columns x_mm, y_mm, z_mm (or x, y, z) by name, else the three of a bare table."""
-    try:
-        lines = csv.reader(io.StringIO(read_text(path, CURVE_BYTES), newline=""))
-        rows = [r for r in lines if r and not r[0].lstrip().startswith("#")]
-    except csv.Error:
-        raise refused(path, "a line that is no CSV", "columns x_mm, y_mm, z_mm of numbers", "save it again") from None
+    rows, _ = rows_of(path)
     if not rows:
         raise refused(path, "an empty file", "points", "columns x_mm, y_mm, z_mm")
     head = [c.strip().lower() for c in rows[0]]
@@ -92,9 +85,7 @@ def read_csv_points(path: Path) -> NDArray[np.float64]:
     if twice:
         raise refused(path, f"two columns {twice[0]}", "one of each", "leave out the other")
     if columns is None and any(c and not _is_number(c) for c in head[:3]):
-        shown = ", ".join(c if c.isprintable() else ascii(c) for c in head[:8]) + " ..." * (len(head) > 8)
-        needed = "x_mm, y_mm, z_mm (or x, y, z), separated by commas"
-        raise unusable(path, f"has columns {shown}; expected {needed}; write them so")
+        raise unusable(path, _without_points(head))
     if columns is None and len(head) != 3:
         raise unusable(path, f"has {len(head)} columns without names; expected x, y, z; name them above the table")
     try:
@@ -104,6 +95,15 @@ def read_csv_points(path: Path) -> NDArray[np.float64]:
     except (ValueError, IndexError) as error:
         allowed = "columns x_mm, y_mm, z_mm of numbers"
         raise refused(path, f"{error} (header {head})", allowed, "name the columns") from error
+
+
+def _without_points(head: list[str]) -> str:
+    """What is wrong with names of columns of which none are a point's, and what to do: metres stay metres."""
+    unit = next((u for u in UNITS_MM if {f"{axis}_{u}" for axis in "xyz"} <= set(head)), "")
+    if unit:
+        return f"has columns in {unit}; expected x, y, z; name them so and write '# unit: {unit}' above"
+    shown = ", ".join(c if c.isprintable() else ascii(c) for c in head[:8]) + " ..." * (len(head) > 8)
+    return f"has columns {shown}; expected x_mm, y_mm, z_mm (or x, y, z), separated by commas; write them so"
 
 
 def _is_number(text: str) -> bool:

@@ -74,13 +74,17 @@ class Stack:
         return float(np.ptp(self.heights) / (len(self.planes) - 1))
 
 
-def _planes_in(folder: Path, wanted: str) -> list[Plane]:
-    """The planes of the one image series in a folder."""
+Series = dict[str, list[tuple[Path, Any]]]
+"""Files with their elements, by the UID of their series."""
+
+
+def series_in(folder: Path) -> tuple[Series, list[str]]:
+    """The image series of a folder's files, and the names of files that cannot be read."""
     entries = sorted(folder.iterdir(), key=lambda p: natural_key(p.name))
     if len(entries) > MOST_FILES:
         raise unusable(folder, f"{len(entries)} entries; allowed: {MOST_FILES} files; keep one series a folder")
     lost: list[str] = []
-    series: dict[str, list[tuple[Path, Any]]] = {}
+    series: Series = {}
     for path in (p for p in entries if p.is_file() and p.name != "DICOMDIR" and not p.name.startswith("._")):
         try:
             if not is_dicom(path):
@@ -93,13 +97,25 @@ def _planes_in(folder: Path, wanted: str) -> list[Plane]:
             lost.append(path.name)
         elif kind:
             series.setdefault(str(data.get("SeriesInstanceUID", "")), []).append((path, data))
+    return dict(sorted(series.items(), key=lambda one: natural_key(_called(*one)))), lost
+
+
+def _called(uid: str, files: list[tuple[Path, Any]]) -> str:
+    """A series as a person knows it, its description, and its UID."""
+    described = str(files[0][1].get("SeriesDescription", "") or "").strip()
+    return f"{described} ({uid})" if described else uid
+
+
+def _planes_in(folder: Path, wanted: str) -> list[Plane]:
+    """The planes of the one image series in a folder."""
+    series, lost = series_in(folder)
     if lost:
         which = f"{len(lost)} of its files cannot be read as DICOM: {', '.join(lost[:5])}. "
         raise unusable(folder, which + "They may be cut short: copy them again, or take them out of the folder.")
     images = {uid: files for uid, files in series.items() if not wanted or uid == wanted}
     if len(images) != 1:
-        groups = "".join(f"\n    {uid}: {len(files)} files" for uid, files in series.items())
-        below = [d.name for d in entries if d.is_dir()]
+        groups = "".join(f"\n    {_called(*one)}: {len(one[1])} files" for one in series.items())
+        below = [d.name for d in sorted(folder.iterdir(), key=lambda p: natural_key(p.name)) if d.is_dir()]
         hint = (
             f"It has sub-folders: {', '.join(below[:5])}; name one of them, as in {folder.name}/{below[0]}.\n"
             if below

@@ -83,6 +83,11 @@ def numbered_frames(paths: Sequence[Path], count: int) -> dict[int, Path]:
             return {number - first: path for number, path in zip(numbers, paths, strict=True)}
     if len(paths) == count or not paths:
         return dict(enumerate(paths))
+    if len(paths) == 1:
+        kind = kind_of(paths[0])
+        why = f"one {'table' if kind == '.csv' else 'file'}, {paths[0].name}, for {count} frames: a {kind} holds one"
+        do = f"split it into wire_000{kind} to wire_{count - 1:03d}{kind}, or write all into one frames.h5"
+        raise unusable(paths[0].parent, f"{why} frame's wire; {do} (/frames/NNN/simulated_mm)")
     shown = f"{len(paths)} files, {paths[0].name} to {paths[-1].name}, for {count} frames"
     do = f"number them from 0 to {count - 1}; an empty file stands for a frame that the simulator failed in"
     raise unusable(paths[0].parent, f"got {shown}: it is not known which belongs to which; {do}")

@@ -80,9 +80,12 @@ def _of_one(first: Path, second: Path, tolerance: Mapping[str, float]) -> Verdic
 def _pooled(before: Sequence[Found], after: Sequence[Found]) -> list[dict[str, Any]]:
     """What differs of overall.csv: columns that have a better side, and the predictor behind skill_strongest.
 
-    Errors are over the frames that count in both: a run of one easy case of four seemed the better one.
+    Errors are over the frames that count in both: a run of one easy case of four seemed the better one. Nothing of runs
+    without a case in common.
     """
     runs = before, after
+    if not {case.result.case for case in before} & {case.result.case for case in after}:
+        return []
     both = frames_in(before) & frames_in(after)
     shares = [{name: run[name] for name in OF_ALL if name in run} for run in map(overall, runs)]
     old, new = (overall(on_frames(run, both)) | own for run, own in zip(runs, shares, strict=True))

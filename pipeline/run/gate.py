@@ -12,6 +12,7 @@ from reports.schema import OURS, OVERALL_FILE, SUMMARY
 from reports.texts import NUMBER
 
 CLOSED = "gate closed"
+A_FEW = "numbers are rms_mm, tip_median_mm, skill_strongest, frames_failed and those in docs/reference/columns.md"
 RELATIONS = {"<=": operator.le, ">=": operator.ge, "<": operator.lt, ">": operator.gt}
 WRITTEN = re.compile(rf"\s*(?:([\w.-]+):)?\s*(\w+)\s*({'|'.join(RELATIONS)})\s*({NUMBER})\s*")
 
@@ -70,6 +71,14 @@ def gate(text: str, simulators: Sequence[str] = ()) -> Gate:
     return found
 
 
+def _instead(column: str, names: Sequence[str]) -> str:
+    """What may be meant by a column that is no number of overall.csv; of its 60 numbers a few."""
+    if column in SUMMARY.names:
+        return f": it is a text; {A_FEW}"
+    nearest = did_you_mean(column, names)
+    return f"; {nearest if nearest.startswith('did you mean') else A_FEW}"
+
+
 def parsed(text: str) -> Gate:
     """The condition, of whichever simulator; raises as ``gate`` does."""
     found = WRITTEN.fullmatch(text)
@@ -80,5 +89,5 @@ def parsed(text: str) -> Gate:
         unquoted = "; in a shell put it in quotes: a bare > writes into a file" * (text.strip() in names)
         raise UsageError([f"--fail-if {text!r}: {do}{unquoted}"])
     if column not in names:
-        raise UsageError([f"--fail-if {text!r}: no number {column!r} in {OVERALL_FILE}; {did_you_mean(column, names)}"])
+        raise UsageError([f"--fail-if {text!r}: no number {column!r} in {OVERALL_FILE}{_instead(column, names)}"])
     return Gate(column, relation, number, name or "")

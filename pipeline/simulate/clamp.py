@@ -249,6 +249,7 @@ def _left_out(out: Sequence[int], used: int) -> str:
     if len(out) < used:
         return f"{what} disagree with the others: left out of the clamp"
     return (
-        f"the simulated wire fits {what} from no clamp that also fits the other {used}: left out of it; check roll, "
-        "material_axis and the wire's tip and stiffness before the traces"
+        f"the simulated wire fits {what} from no clamp that also fits the other {used}: left out of it; check entry_mm "
+        "first (beyond the real clamp a wire moves from frame to frame: an entry that is stated some mm too deep fits "
+        "none of them together), then roll, material_axis and the wire's tip and stiffness, before the traces"
     )

@@ -10,11 +10,13 @@ from scipy import ndimage
 
 from pipeline.load import SUFFIXES, load, read_header
 from pipeline.load.config import LoadConfig
-from pipeline.load.geometry import unusable
+from pipeline.load.dicom import series_in
+from pipeline.load.geometry import LoadError, unusable
 from pipeline.load.guard import is_folder
 from pipeline.load.order import natural_key
 from pipeline.load.slices import is_dicom, is_multiframe
 from pipeline.model import Array, Volume, Wall
+from pipeline.study.same_grid import apart
 
 NO_REFERENCE = "reference: none found (a file named reference.*); --reference names a scan without the wire"
 REFERENCE_NAMES = ("reference", "ref", "wire_free", "nowire", "empty")
@@ -82,6 +84,17 @@ def _deeper(folder: Path) -> str:
         f"; further down are scans: {names}; move each frame's own folder or file up into "
         f"{folder.resolve().name}/frames, or list them in a manifest (frames = [...])"
     )
+
+
+def _loose(folder: Path) -> str:
+    """A hint where slices lie in frames/ itself, which holds a folder or a file for each frame; empty without."""
+    frames = folder / "frames"
+    if not is_folder(frames) or not any(_is_dicom(p) for p in frames.iterdir()):
+        return ""
+    series, _ = series_in(frames)
+    count, slices = len(series), sum(map(len, series.values()))
+    of = "one series" if count == 1 else f"{count} series"
+    return f"; frames/ holds {slices} slices of {of}: one folder a series, as in frames/0, frames/1" * bool(count)
 
 
 def looks_wire_free(path: Path) -> bool:
@@ -168,12 +181,20 @@ def _ends(points: Array) -> Array:
 def _stated_or_seen(
     entry: Array | None, direction: Array | None, frames: Sequence[Path], reference: Path | None, config: LoadConfig
 ) -> tuple[Array, Array, str]:
-    """Entry and direction, each as the frames show it where it is not stated; a sentence on what is not."""
+    """Entry and direction, each as the frames show it where it is not stated; a sentence on what is not.
+
+    LoadError where the scans that are subtracted for it do not lie on one grid.
+    """
     if entry is not None and direction is not None:
         return entry, direction, ""
 
+    looked_at = [reference, frames[0], frames[-1]] if reference else frames[:1]
+    headers = {path: read_header(path, config) for path in looked_at}
+    if problems := apart([*headers.values()]):
+        raise LoadError(problems[0])
+
     def loaded(path: Path) -> Volume:
-        return load(read_header(path, config), config=config)
+        return load(headers[path], config=config)
 
     empty, last = loaded(reference) if reference else None, NOWHERE
     if empty is not None and len(frames) > 1:
@@ -203,7 +224,7 @@ def infer_manifest(
     if not frames:
         allowed = f"files {', '.join(SUFFIXES)} or DICOM folders, here or in frames/"
         found = f"{reference.name} alone, a reference, and no frames" if reference else "no scans"
-        raise unusable(folder, f"found {found}; allowed: {allowed}{_deeper(folder)}")
+        raise unusable(folder, f"found {found}; allowed: {allowed}{_loose(folder) or _deeper(folder)}")
     seen = (
         f"frames: {len(frames)} scans in natural order, {frames[0].name} to {frames[-1].name}",
         f"reference: {reference.name}" if reference else NO_REFERENCE,

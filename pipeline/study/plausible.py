@@ -14,6 +14,7 @@ from pipeline.study.infer import beside
 from pipeline.study.manifest import Case
 from pipeline.study.same_scans import continued, shared
 from pipeline.study.settings import Config
+from pipeline.trace.config import MOST_APART
 from reports.case_files import listed
 
 SHORT_WAY = 0.5
@@ -191,6 +192,19 @@ def too_thin(case: Case, header: Header | None) -> list[str]:
     ]
 
 
+def slices_apart(case: Case, header: Header | None) -> list[str]:
+    """A sentence where slices lie so far apart that no trace is accepted. header : of a scan of the case."""
+    if header is None or not case.frames or case.traces:
+        return []
+    far, near = float(header.spacing_mm.max()), float(header.spacing_mm.min())
+    if far / near < MOST_APART:
+        return []
+    return [
+        f"the scan has slices of {far:.3g} mm and pixels of {near:.3g} mm, {far / near:.1f} times as far apart: from "
+        f"{MOST_APART:g} times on no trace is accepted; reconstruct thinner slices"
+    ]
+
+
 def in_case(case: Case, scan: Header | None) -> list[str]:
     """What is doubtful in a case beside its wire and its truth. scan : header of a scan of the case."""
     of_scan = [
@@ -200,7 +214,8 @@ def in_case(case: Case, scan: Header | None) -> list[str]:
         *leads_out(case, scan),
         *odd_depths(case, scan),
     ]
-    return [*of_scan, *wrapped_rolls(case), *odd_wall(case.wall), *odd_catheter(case.catheter), *too_thin(case, scan)]
+    thin = [*too_thin(case, scan), *slices_apart(case, scan)]
+    return [*of_scan, *wrapped_rolls(case), *odd_wall(case.wall), *odd_catheter(case.catheter), *thin]
 
 
 def doubts(cases: Sequence[Case], config: Config) -> Iterator[str]:

@@ -123,6 +123,10 @@ def of_catheter(curve: Curve, catheter_mm: float) -> Curve:
     return replace(curve, status=FrameStatus.TRACE_AMBIGUOUS, note=note, levels=levels)
 
 
+TURN_ROUND = "; or entry_direction points back along the wire: turn it round"
+"""Advice on a trace that has hardly begun."""
+
+
 def of_length(curve: Curve, expected_mm: float | None, config: TraceConfig) -> Curve:
     """The curve, traced or given; an OK one whose length is too far from the expected one gets LENGTH_MISMATCH."""
     if curve.status is not FrameStatus.OK or missed_mm(curve.length_mm, expected_mm, config) == 0:
@@ -131,7 +135,7 @@ def of_length(curve: Curve, expected_mm: float | None, config: TraceConfig) -> C
     note += f"{config.length_tolerance_mm} mm; look at the picture, then correct the manifest or "
     note += "trace.length_tolerance_mm"
     if hardly_begun(curve.length_mm, expected_mm):
-        note += "; or entry_direction points back along the wire: turn it round"
+        note += TURN_ROUND
     if expected_mm and (unit := unit_of(curve.length_mm / expected_mm, UNIT_ROOM)):
         note += f"; it would do in {unit}: give mm"
     return replace(curve, status=FrameStatus.LENGTH_MISMATCH, note=note)

@@ -9,6 +9,7 @@ from pipeline.model import Array
 from pipeline.status import FrameStatus
 from pipeline.trace.ahead import dark_ahead, hidden_ahead
 from pipeline.trace.attempt import Attempt
+from pipeline.trace.config import MOST_APART
 from pipeline.trace.onward import GOES_ON
 from pipeline.trace.outside import seen_outside, thread_outside
 from pipeline.trace.reach import end_range
@@ -24,9 +25,6 @@ far outside a curve may lead: what lies there is bridged, not seen."""
 PADDED = 0.03
 """Share of flat voxels around a curve's end (4 of 123) from which it ends at the padding around the reconstruction."""
 _AROUND = np.array([p for p in np.ndindex(7, 7, 7) if np.linalg.norm(np.subtract(p, 3)) <= 3.0], float) - 3.0
-MOST_APART = 3.0
-"""Slice distance over pixel size from which no curve is accepted: of 22 wires in slices of 2 mm and pixels of 0.5 mm,
-with insertion_mm stated, 5 had the stated length and 3 of these were over 1.5 pixels off, at the tip or all along."""
 ENDS_OUTSIDE_VOXELS = 3.0
 """How far outside the lumen a curve may end: grey is read up to HALO_VOXELS of it, and wires that went on through a
 wall, or beyond the end of the contrast medium, were cut off there, ok (2 to 5 mm of them, 26 of 62)."""
@@ -232,9 +230,9 @@ def of_the_whole(image: Subtraction, attempt: Attempt, points: Array, length_mm:
     step = length_mm / max(1, len(points) - 1)
     turn = sharpest_turn_deg(points[: -max(1, round(J_MM / max(step, 1e-9)))], step, HAIRPIN_VOXELS * image.voxel)
     return (
-        (image.slices_apart >= MOST_APART, FrameStatus.TRACE_AMBIGUOUS,
-         f"slices {image.slices_apart:.1f} times as far apart as pixels",
-         f"less than {MOST_APART} times",
+        (image.edges_mm[0] / image.edges_mm[1] >= MOST_APART, FrameStatus.TRACE_AMBIGUOUS,
+         "slices of {:.3g} mm and pixels of {:.3g} mm".format(*image.edges_mm),
+         f"less than {MOST_APART:g} times as far apart",
          "reconstruct thinner slices: in these a wire and its ends are off by more than its uncertainty says"),
         (_haloed(image, attempt.tube), FrameStatus.TRACE_AMBIGUOUS,
          f"a sharp line in a halo of {attempt.tube.offset / max(attempt.tube.peak, 1e-9):.2f} of its brightness",

@@ -99,10 +99,10 @@ class Subtraction:
         return inside, float(np.median(grey[out])) if out.any() else inside
 
     @property
-    def slices_apart(self) -> float:
-        """Largest over smallest voxel edge of the scan."""
+    def edges_mm(self) -> tuple[float, float]:
+        """Largest and smallest voxel edge of the scan."""
         size = self.region.box.spacing_mm
-        return float(np.max(size) / np.min(size))
+        return float(np.max(size)), float(np.min(size))
 
     def noise_in(self, blur_voxels: float) -> float:
         """Standard deviation of the noise in grey blurred by so many voxels, measured: correlation counts."""

@@ -155,6 +155,9 @@ def _carried_out(verb: str, manifest: Place, settings: object = None, **options:
         expected = 'a mapping, {"segment.threshold": 0.5}, with the keys that --set takes'
         raise InputError([f"settings: got {settings!r}; expected {expected}"])
     for key, wanted in (settings or {}).items():
+        if isinstance(wanted, Mapping):
+            flat = {f"{key}.{name}": value for name, value in wanted.items()}
+            raise InputError([f"settings: write {json.dumps(flat, default=str)}"])
         words += ["--set", f"{key}={json.dumps(wanted)}"]
     for name, value in options.items():
         for one in value if isinstance(value, (list, tuple)) else [value]:

@@ -1,5 +1,6 @@
 """What a run left in its folder, as pandas frames."""
 
+import html
 import math
 import warnings
 from collections.abc import Mapping, Sequence, Sized
@@ -84,11 +85,17 @@ class Results:
         more = f"\n... and {len(self.summary) - 10} more cases" if len(self.summary) > 10 else ""
         counted: dict[str, Sized] = {"case": self.cases, "frame": self.errors, "failure": self.failures}
         counts = ", ".join(f"{len(of)} {name}{'s' * (len(of) != 1)}" for name, of in counted.items())
-        return f"Results of {self.out}: {counts}\n{rows}{more}"
+        return "\n".join([f"Results of {self.out}: {counts}", f"{rows}{more}", *self._amiss()])
 
     def _repr_html_(self) -> str:
-        """What a notebook shows: a row a case."""
-        return str(self.summary[_SHOWN].to_html(index=False))
+        """What a notebook shows: a row a case, and below it what closed."""
+        below = "".join(f"<p>{html.escape(text)}</p>" for text in self._amiss())
+        return str(self.summary[_SHOWN].to_html(index=False)) + below
+
+    def _amiss(self) -> list[str]:
+        """Closed gates and damaged cases, a line each: the rows of a table do not show them."""
+        damaged = f"damaged, left out: {listed(self.damaged)}"
+        return [*self.closed, *[damaged] * bool(self.damaged), *filter(None, [self.other_tables])]
 
 
 def read_results(out: str | Path) -> Results:

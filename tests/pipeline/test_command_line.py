@@ -75,6 +75,12 @@ TOO_LONG = (
         ("run STUDY -o y --fail-if max_mm>1_0", "a limit in plain digits, as in"),  # was taken for 10
         ("run STUDY -o y --fail-if max_mm>\N{FULLWIDTH DIGIT ONE}", "a limit in plain digits, as in"),
         ("run STUDY -o y --fail-if case>1", "no number 'case'"),
+        (
+            "run STUDY -o y --fail-if strongest_null>1",
+            "in overall.csv: it is a text; numbers are rms_mm, tip_median_mm",
+        ),
+        ("run STUDY -o y --fail-if status>0", "frames_failed and those in docs/reference/columns.md"),
+        ("run STUDY -o y --fail-if tip_mm>9", "did you mean 'tip_median_mm'?"),
         ("init STUDY", "is there already"),
         ("init STUDY/none", "no such folder"),
         ("init STUDY/reference.mha", "this is a file; give a folder that holds scans"),
@@ -89,6 +95,7 @@ TOO_LONG = (
         ("settings solver.segmnt_mm", "did you mean 'solver.segment_mm'?"),
         ("run", "missing: MANIFEST, -o; wireval run --help lists what there is"),
         ("run STUDY -o", "-o: its value is missing"),
+        ("cache --limit -1G", "--limit: its value is missing (one that begins with - is written --limit=-VALUE)"),
         ("run STUDY -o EMPTY", "an empty argument"),
         ("run STUDY -o y -j x", "-j 'x': expected a whole number"),
         ("run STUDY -o y -q -v", "-v and -q: give one of them"),

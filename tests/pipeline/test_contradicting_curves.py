@@ -154,8 +154,8 @@ def test_control_points_are_placed_and_have_three_numbers(
 @pytest.mark.parametrize(
     ("head", "row", "said"),
     [
-        ("# space: RAS\n# space: LPS\nx,y,z\n", "0,0,5", "got LPS and RAS in the lines above its table"),
-        ("# unit: m\nx_mm,y_mm,z_mm\n", "0,0,5", "got m and mm in the lines above its table, or its columns"),
+        ("# space: RAS\n# space: LPS\nx,y,z\n", "0,0,5", "got LPS and RAS in the comments of its table"),
+        ("# unit: m\nx_mm,y_mm,z_mm\n", "0,0,5", "got m and mm in the comments of its table, or its columns"),
         ("# unit: mm\nx_mm,y_mm,z_mm\n", "0,0,5", ""),
         ("# unit: millimeter\nx_mm,y_mm,z_mm\n", "0,0,5", ""),
         ("# space: LPS\n# coordinateSystem: 1\nx,y,z\n", "0,0,5", ""),

@@ -12,6 +12,7 @@ from pipeline.run.log import Log
 from pipeline.run.stages.depths import (
     in_another_order,
     in_step,
+    not_to_be_turned,
     shrinking,
     standing,
     stated_elsewhere,
@@ -108,6 +109,11 @@ def test_frames_in_another_order_are_named_as_such() -> None:
     for lengths in (DEPTHS[:5], [10.0, 14.0, 12.0, 22.0, 26.0], [d + 3.0 for d in DEPTHS[:5]]):
         other = frames(lengths, DEPTHS[:5])
         assert not in_another_order(other, from_entry(other), 2.0)
+    wrong = of_length(seen[0].curve, 180.0, TraceConfig())
+    assert "turn it round" in wrong.note
+    (told,) = not_to_be_turned([seen[0].traced_by(wrong)])
+    assert "turn it round" not in told.message
+    assert "correct the manifest or trace.length_tolerance_mm" in told.message
     unknown = frames(DEPTHS[:2], [float("nan")] * 2)
     assert not in_another_order(unknown, from_entry(unknown), 2.0)
 

@@ -225,7 +225,8 @@ def test_traces_are_not_blamed_where_most_of_them_fit_no_clamp() -> None:
     most = _left_out([0, 1, 2, 3], 2)
     assert "disagree" not in most
     assert "frames 0, 1, 2, 3" in most
-    assert "check roll" in most
+    assert "check entry_mm first (beyond the real clamp a wire moves from frame to frame" in most
+    assert most.index("entry_mm") < most.index("roll") < most.index("before the traces")
 
 
 def test_a_clamp_that_is_turned_keeps_the_material_axis_that_was_not_stated() -> None:

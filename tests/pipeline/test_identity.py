@@ -18,7 +18,7 @@ from pipeline.load.order import natural_key
 from pipeline.model import Volume
 from pipeline.run.hashing import file_hash
 from pipeline.run.store import digest
-from pipeline.study.infer import AT_EDGE, IN_PLACE, _deeper, _scans_in, infer_entry
+from pipeline.study.infer import AT_EDGE, IN_PLACE, _deeper, _scans_in, infer_entry, infer_manifest
 from pipeline.study.manifest import ManifestError, read_manifest
 from tests.pipeline.test_load import SPACING, image_of, numbered
 from tests.pipeline.test_manifest import GOOD
@@ -233,3 +233,18 @@ def test_the_wire_begins_where_it_stays_in_place() -> None:
     assert direction[2] > 0.9
     for told in (np.zeros((0, 3)), first.to_mm(np.argwhere(first.values > 0))):  # one frame, or all of one depth
         assert infer_entry(first, None, Path("f.mha"), told)[2] == AT_EDGE
+
+
+@pytest.mark.parametrize(("size", "origin_mm", "said"), [(12, 0.0, "the shapes differ"), (16, 1.0, "voxels apart")])
+def test_a_reference_on_another_grid_is_told_before_it_is_subtracted(
+    tmp_path: Path, size: int, origin_mm: float, said: str
+) -> None:
+    """One of another shape ended in a traceback; one that lies elsewhere gave an entry of noise."""
+    reference = sitk.Image(size, size, size, sitk.sitkInt16)
+    reference.SetOrigin((origin_mm,) * 3)
+    sitk.WriteImage(reference, str(tmp_path / "reference.mha"))
+    for number in range(2):
+        sitk.WriteImage(sitk.Image(16, 16, 16, sitk.sitkInt16), str(tmp_path / f"f{number}.mha"))
+    with pytest.raises(LoadError, match=f"geometry differs between scans of one case: .*{said}"):
+        infer_manifest(tmp_path, None, None, None, LoadConfig())
+    assert main(["init", str(tmp_path)]) == 2

@@ -17,6 +17,7 @@ from pipeline.load import Crop, LoadError, Source, each_volume, load, outside, r
 from pipeline.load.config import LoadConfig
 from pipeline.load.files import parts as file_parts
 from pipeline.run.hashing import file_hash
+from pipeline.study.infer import infer_manifest
 
 SPACING, ORIGIN = (0.4, 0.5, 0.7), (12.0, -30.0, 5.0)
 TURN = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
@@ -326,12 +327,23 @@ def test_two_series_in_a_folder_are_listed(tmp_path: Path) -> None:
     write_series(tmp_path / "series", numbered(), straight_stack())
     image = sitk.ReadImage(str(next((tmp_path / "series").iterdir())))
     image.SetMetaData("0020|000e", "9.9.9")
+    image.SetMetaData("0008|103e", "Series 10")
     writer = sitk.ImageFileWriter()
     writer.KeepOriginalImageUIDOn()
     writer.SetFileName(str(tmp_path / "series" / "other.dcm"))
     writer.Execute(image)
-    with pytest.raises(LoadError, match="found 2 DICOM image series"):
+    image.SetMetaData("0020|000e", "9.9.10")
+    image.SetMetaData("0008|103e", "Series 9")
+    writer.SetFileName(str(tmp_path / "series" / "third.dcm"))
+    writer.Execute(image)
+    with pytest.raises(LoadError, match="found 3 DICOM image series") as told:
         read_header(tmp_path / "series")
+    assert "Series 9 (9.9.10): 1 files\n    Series 10 (9.9.9): 1 files" in str(told.value)
+    # named so, the folder of frames is no frame, and "no frames" was all that was said of it
+    (tmp_path / "series").rename(tmp_path / "frames")
+    slices = len(list((tmp_path / "frames").iterdir()))
+    with pytest.raises(LoadError, match=f"frames/ holds {slices} slices of 3 series: one folder a series"):
+        infer_manifest(tmp_path, None, None, None, LoadConfig())
 
 
 def test_what_is_not_there_or_no_scan_is_said(tmp_path: Path) -> None:

@@ -26,6 +26,7 @@ from pipeline.study.plausible import (
     odd_depths,
     odd_truth,
     other_voxels,
+    slices_apart,
     wrapped_rolls,
 )
 from pipeline.study.same_scans import continued
@@ -268,6 +269,19 @@ def test_depths_that_go_down_are_a_warning(tmp_path: Path) -> None:
     for depths, count in (("[10, 20, 30, 20, 10]", 0), ("[10, 20, 19.9, 30]", 0), ("[30, 20, 10]", 1)):
         (case,) = read_manifest(written(tmp_path, text.replace("[14, 39, 20, 21, 8]", depths))).cases
         assert len(odd_depths(case, None)) == count
+
+
+@pytest.mark.parametrize(("slices_mm", "told"), [(0.8, 0), (0.9, 1)])
+def test_slices_in_which_no_trace_is_accepted_are_doubted(tmp_path: Path, slices_mm: float, told: int) -> None:
+    """Nothing was found to be wrong, and then every frame failed."""
+    case = read_manifest(written(tmp_path, GOOD)).cases[0]
+    spacing = np.array([0.3, 0.3, slices_mm])
+    header = Header(Source(tmp_path / "a.mha"), (99, 99, 99), spacing, np.array([-9.0, 0, 0]), np.eye(3), "int16")
+    said = slices_apart(case, header)
+    assert len(said) == told
+    assert all("slices of 0.9 mm and pixels of 0.3 mm, 3.0 times" in text for text in said)
+    assert set(said) <= set(in_case(case, header))
+    assert slices_apart(case.model_copy(update={"traces": case.frames}), header) == []
 
 
 @pytest.mark.parametrize(("radius_mm", "modulus_gpa"), [(0.18, 9.5), (0.444, 9.5), (0.444, 158.4), (0.1, 60.0)])

@@ -258,6 +258,75 @@ def test_a_table_says_its_space_and_unit(tmp_path, said, turned, factor):
     np.testing.assert_allclose(read_curve(tmp_path / "a.csv").points_mm, points * factor * [turned, turned, 1])
 
 
+BOM = "\N{ZERO WIDTH NO-BREAK SPACE}"
+LONG = "# made by a program that says much of itself\n" * 200
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        f"{BOM}# space: RAS\nx_mm,y_mm,z_mm\n{{}}",
+        '"# space: RAS"\nx_mm,y_mm,z_mm\n{}',
+        f"{LONG}# space: RAS\nx_mm,y_mm,z_mm\n{{}}",
+        "x_mm,y_mm,z_mm\n{}\n# space: RAS\n",
+        "# coordinate system: RAS\nx_mm,y_mm,z_mm\n{}",
+        "# space = right-anterior-superior\nx_mm,y_mm,z_mm\n{}",
+        '"# space: RAS, as of 3D Slicer"\n"x_mm","y_mm","z_mm"\n{}',
+        "# free space: 1.5 mm\n# space: RAS\nx_mm,y_mm,z_mm\n{}",
+    ],
+)
+def test_a_stated_ras_is_seen_wherever_and_however_it_stands(tmp_path: Path, text: str) -> None:
+    """It was dropped without a word, and the wire scored as LPS."""
+    (tmp_path / "a.csv").write_text(text.format("1,2,3\n4,5,6\n7,8,10"), encoding="utf-8")
+    turned = [[-1.0, -2, 3], [-4, -5, 6], [-7, -8, 10]]
+    np.testing.assert_allclose(read_curve(tmp_path / "a.csv").points_mm, turned)
+    (read,) = read_wires([Source(tmp_path / "a.csv")], 1)
+    np.testing.assert_allclose(read.points_mm, turned)
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("# RAS", "a line speaks of RAS"),
+        ("# frame: RAS mm", "write it so"),
+        ("# axes go to right, anterior, superior (right-anterior)", "a line speaks of RAS"),
+        ("# space: LAS", "got space LAS; expected LPS or RAS"),
+        ("# space: RAS\n# coordinate system = LPS", "got LPS and RAS in the comments"),
+    ],
+)
+def test_what_speaks_of_ras_and_does_not_state_it_is_refused(tmp_path: Path, line: str, said: str) -> None:
+    for text in (f"{line}\nx_mm,y_mm,z_mm\n1,2,3\n4,5,6\n", f"x_mm,y_mm,z_mm\n1,2,3\n4,5,6\n{line}\n"):
+        (tmp_path / "a.csv").write_text(text, encoding="utf-8")
+        with pytest.raises(LoadError, match=said):
+            read_curve(tmp_path / "a.csv")
+        with pytest.raises(LoadError, match=said):
+            read_wires([Source(tmp_path / "a.csv")], 1)
+
+
+def test_one_table_of_all_frames_is_told_how_to_be_split(tmp_path: Path) -> None:
+    """ "got 1 files, all.csv to all.csv, for 6 frames"."""
+    with pytest.raises(LoadError, match=r"one table, all\.csv, for 6 frames: .* into wire_000\.csv to wire_005\.csv"):
+        read_wires([Source(tmp_path / "all.csv")], 6)
+
+
+@pytest.mark.parametrize("unit", ["m", "cm"])
+def test_columns_in_metres_are_not_to_be_renamed_to_mm(tmp_path: Path, unit: str) -> None:
+    text = f"x_{unit},y_{unit},z_{unit}\n1,2,3\n4,5,6\n"
+    (tmp_path / "a.csv").write_text(text, encoding="utf-8")
+    with pytest.raises(LoadError, match=f"columns in {unit}; expected x, y, z; .* '# unit: {unit}' above") as told:
+        read_curve(tmp_path / "a.csv")
+    assert "_mm" not in str(told.value)
+
+
+@pytest.mark.parametrize("head", [f"{BOM}x_mm,y_mm,z_mm", '"x_mm","y_mm","z_mm"'])
+def test_names_of_columns_say_lps_and_mm_as_excel_writes_them(tmp_path: Path, head: str) -> None:
+    """Both were refused as wires of which nobody says the space."""
+    (tmp_path / "a.csv").write_text(f"{head}\r\n1,2,3\r\n4,5,6\r\n", encoding="utf-8")
+    (read,) = read_wires([Source(tmp_path / "a.csv")], 1)
+    assert (read.problem, read.unit) == ("", "mm")
+    np.testing.assert_allclose(read.points_mm, [[1, 2, 3], [4, 5, 6]])
+
+
 @pytest.mark.parametrize(
     "text",
     [

@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 
 from pipeline.cli import main
 from pipeline.run.simulators import OF_SKILL, Piece, _rows, side_by_side, write_comparison
+from pipeline.run.stages import others
+from pipeline.run.stages.known import Known
 from reports import tables
 from reports.case_page import render_case
 from reports.doubts import AMONG, COUNT_AS, MADE_FROM_TRACES
@@ -355,3 +357,11 @@ def test_insertions_that_look_like_one_have_no_green_badge(tmp_path: Path) -> No
     assert '<span class="status poor">insertions look like one</span>' in page
     said = verdict({"rms_mm": 0.2}, doubt=Doubt(twins="insertions 'a', 'b' tell no more than one"))
     assert said.endswith("But insertions look like one that was scanned again, and count as several: see the warnings.")
+
+
+@pytest.mark.parametrize(("wires", "said"), [(1, "frame 0: 100 %"), (2, "2 frames, the worst is frame 0: 100 %")])
+def test_the_frame_of_a_share_is_told_apart_from_it(monkeypatch: pytest.MonkeyPatch, wires: int, said: str) -> None:
+    """It was "in frame 5 71 % of the wire"."""
+    monkeypatch.setattr(others, "_clearance", lambda _known, points: np.full(len(points), 9.0))
+    (text,) = others._outside(Known(), dict.fromkeys(range(wires), np.eye(3)), 0.18)
+    assert text.startswith(f"{said} of the wire lies outside the lumen")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -36,6 +37,8 @@ def test_a_check_gives_sentences(study: Path, tmp_path: Path) -> None:
     assert wireval.check(study) == []
     assert wireval.check(tmp_path / "none.toml") == [f"{tmp_path / 'none.toml'}: no such manifest"]
     assert "expected a number from 0.01 to 100" in wireval.check(study, settings={"solver.segment_mm": -1})[0]
+    nested = {"solver": {"segment_mm": 0.5}}
+    assert wireval.check(study, settings=nested) == ['settings: write {"solver.segment_mm": 0.5}']
     assert wireval.check(tmp_path)[0].endswith("here or in frames/"), "a folder without scans"
 
 
@@ -60,6 +63,10 @@ def test_a_run_gives_frames(study: Path, tmp_path: Path) -> None:
         results.cases["straight"].read_frame(2)
     assert "straight" in results._repr_html_()
     assert "1 case, 2 frames, 0 failures" in repr(results)
+    gate = "gate closed: --fail-if rms_mm>0: rms_mm is 1"
+    closed = replace(results, closed=(gate,), damaged=("straight",))
+    assert repr(closed).splitlines()[-2:] == [gate, "damaged, left out: straight"]
+    assert "<p>gate closed: --fail-if rms_mm&gt;0: rms_mm is 1</p><p>damaged" in closed._repr_html_()
     assert len(repr(results).splitlines()) < 13
     assert len(repr(results)) < 1000
     assert wireval.read_results(tmp_path / "out").errors.equals(results.errors)

@@ -359,13 +359,13 @@ def test_a_calibration_case_is_not_said_to_be_better(tmp_path: Path) -> None:
     write_run(tmp_path, [FakeCase("learnt", frames=3, role="calibration"), FakeCase("judged", frames=3)])
     text = {n: render_case(tmp_path / "cases" / n).read_text(encoding="utf-8") for n in ("learnt", "judged")}
     assert "It is a calibration case and not scored" in text["learnt"]
-    assert "That is better" not in text["learnt"]
-    assert "That is better" in text["judged"]
+    assert "The wire is better" not in text["learnt"]
+    assert "The wire is better" in text["judged"]
 
 
 @pytest.mark.usefixtures("scarce")
 def test_a_case_that_is_worse_than_a_guess_is_marked_and_named(tmp_path: Path) -> None:
-    """The index was green and said "That is better" of both together."""
+    """The index was green and said "The wire is better" of both together."""
     out = write_run(tmp_path / "out", (FakeCase("a", 3), FakeCase("b", 3)))
     rows = tables.read(out / "summary.csv", SUMMARY).assign(skill_strongest=[0.9, -0.6], strongest_null="previous")
     tables.write(out / "summary.csv", SUMMARY, rows)

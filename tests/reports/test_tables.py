@@ -13,6 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from reports import tables
+from reports._content import quoted_first
 from reports.atomic import replacing
 from reports.schema import ERRORS, FAILURES, POINTS, SUMMARY, TIMINGS, Table
 
@@ -43,6 +44,15 @@ SUMMARY_HEADER = (
 )
 TIMINGS_HEADER = "case,frame,load_s,segment_s,trace_s,clamp_s,simulate_s,compare_s,total_s,peak_memory_MiB"
 FAILURES_HEADER = "case,frame,stage,status,sentence,message,log,simulator"
+
+
+def test_the_number_to_quote_stands_before_what_a_narrow_window_cuts_off() -> None:
+    """On pages alone: columns of files keep their order."""
+    names = [column.name for column in quoted_first(SUMMARY.shown("cases"))]
+    for later in ("distal10_rms_mm", "tip_median_mm", "skill"):
+        assert names.index("rms_mm") < names.index("skill_strongest") < names.index(later)
+    assert names.index("strongest_null") == names.index("skill_strongest") + 1
+    assert sorted(names) == sorted(column.name for column in SUMMARY.shown("cases"))
 
 
 def _header(path: Path) -> str:

@@ -179,6 +179,23 @@ def test_pooled_errors_of_both_are_over_the_same_frames(
     assert " rms_mm" not in shown, "the same frames have the same errors"
 
 
+def test_runs_without_a_case_in_common_have_no_number_over_the_frames_of_both(
+    first: Path, second: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It said within_1mm 1 -> 0 over frames that were not there; and frames without a number are blank, not <NA>."""
+    for name in ("b", "c"):
+        shutil.rmtree(second / "cases" / name)
+    (second / "cases" / "a").rename(second / "cases" / "other")
+    path = second / "cases" / "other" / "result.json"
+    result = json.loads(path.read_text(encoding="utf-8"))
+    path.write_text(json.dumps(result | {"case": "other", "group": "other"}), encoding="utf-8")
+    assert main(["diff", str(first), str(second)]) == 1
+    said = capsys.readouterr().out
+    assert "Over the frames of both" not in said
+    assert "no frame has points in both runs" in said
+    assert "<NA>" not in said
+
+
 def test_small_changes_of_every_frame_close_the_gate_over_all(first: Path, second: Path, tmp_path: Path) -> None:
     """A tenth more of 0.1 mm is allowed in a frame; in all of them at once it is not."""
     times(second, 1.1)

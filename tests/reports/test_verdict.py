@@ -16,12 +16,12 @@ from tests.reports.fake_results import FakeCase, write_run
 @pytest.mark.parametrize(
     ("skill", "low", "said"),
     [
-        (0.9, 0.7, "That is better (skill 0.900) than "),
-        (0.9, None, "That is better (skill 0.900) than "),
+        (0.9, 0.7, "The wire is better (skill 0.900) than "),
+        (0.9, None, "The wire is better (skill 0.900) than "),
         (0.4, -0.1, "It is not shown to be better (skill 0.400, its interval reaches -0.100) than "),
-        (-0.2, -0.5, "That is no better (skill -0.200) than "),
-        (-0.05, None, "That is no better (skill -0.0500) than "),
-        (-38.6, None, "That is worse (skill below -10) than "),
+        (-0.2, -0.5, "The wire is no better (skill -0.200) than "),
+        (-0.05, None, "The wire is no better (skill -0.0500) than "),
+        (-38.6, None, "The wire is worse (skill below -10) than "),
     ],
 )
 def test_the_verdict_follows_the_strongest_rival(skill: float, low: float | None, said: str) -> None:
@@ -138,7 +138,7 @@ def test_a_wire_that_ends_elsewhere_is_not_called_better(along: float | None, sa
     assert f"The wire {said} (median)" in verdict(row)
     assert ("rms_mm does not see that" in verdict(row)) is (along != 1.9), "what lies beyond the trace is seen"
     assert ("judge by tip_median_mm, and by back_rms_mm of errors.csv" in verdict(row)) is (along != 1.9)
-    assert "That is better" not in verdict(row)
+    assert "The wire is better" not in verdict(row)
     assert badge("ok", True, row | {"tip_median_mm": 0.29})["look"] == "good"
     assert badge("ok", True, row | {"rms_mm": 0.7})["look"] == "good", "a tip is the worst of most wires"
 
@@ -174,7 +174,7 @@ def test_worse_is_said_where_the_whole_interval_is(low: float | None, high: floa
 def test_the_verdict_says_of_how_many_planned_frames_it_speaks() -> None:
     """Half the frames lost took the partners of a predictor: the verdict became better (0.926 instead of 0.563)."""
     row = {"rms_mm": 0.2, "skill_strongest": 0.9, "strongest_null": "centreline", "frames": 12, "frames_ok": 6}
-    assert "That is better" in verdict(row)
+    assert "The wire is better" in verdict(row)
     assert "This speaks of 6 of 12 planned frames alone" in verdict(row)
     assert "weaker without the others" in verdict(row)
     assert "planned" not in verdict(row | {"frames_ok": 12})
@@ -182,8 +182,14 @@ def test_the_verdict_says_of_how_many_planned_frames_it_speaks() -> None:
 
 def test_a_wrong_roll_is_guessed_at() -> None:
     row = {"rms_mm": 2.0, "null_roll_unknown_rms_mm": 0.82, "skill_strongest": -1.0, "strongest_null": "roll_unknown"}
-    assert "worse than with an unknown roll (0.820 mm): check axes (LPS or RAS) and roll; roll_deg" in verdict(row)
+    assert (
+        "With an unknown roll the wire lies nearer (0.820 mm): check axes (LPS or RAS) and roll; roll_deg"
+        in verdict(row)
+    )
     assert "check axes" not in verdict(row | {"null_roll_unknown_rms_mm": 1.9})
+    said = verdict(row)  # it was said twice, and "That is worse" had lost its noun
+    assert said.count("worse") == 1
+    assert said.index("The wire is worse (skill -1.00)") < said.index("With an unknown roll")
 
 
 def test_a_roll_is_to_be_fitted_only_where_it_can_be_and_is_not() -> None:
@@ -211,7 +217,7 @@ def test_no_error_no_verdict_and_intervals_where_there_are_any() -> None:
 def test_an_end_that_nothing_bounds_is_no_better() -> None:
     """The field is empty as that of an interval that is withheld, and means the opposite."""
     row = {"rms_mm": 0.25, "skill_strongest": 0.9, "strongest_null": "previous", "interval": "wide: 4 insertions"}
-    assert "That is better" in verdict(row)
+    assert "The wire is better" in verdict(row)
     row["interval"] += "; not bounded: rms_high_mm, skill_strongest_low"
     assert "It is not shown to be better (skill 0.900, its interval has no lower end)" in verdict(row)
     assert badge("ok", True, row)["look"] == "poor"

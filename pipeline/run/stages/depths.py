@@ -4,6 +4,7 @@ Stated depths are off by the errors of the hand's scale and of the entry, which 
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -14,6 +15,7 @@ from pipeline.model import Array, Clamp
 from pipeline.run.stages.known import Frame
 from pipeline.simulate.clamp import depth_from
 from pipeline.status import FrameStatus
+from pipeline.trace import TURN_ROUND
 
 AROUND = 5
 """Number of neighbouring frames whose median difference of traced length and stated depth is the usual one."""
@@ -120,6 +122,11 @@ def in_another_order(frames: Sequence[Frame], depths_mm: Mapping[int, float], to
         f"of frame {numbers[worst]}, {traced[worst]:.1f} mm, is of frame {numbers[int(whose[worst])]}; are frames and "
         "insertion_mm in one order?"
     ]
+
+
+def not_to_be_turned(frames: Sequence[Frame]) -> list[Frame]:
+    """The frames, where they are known to be in another order: none that is told to turn its direction round."""
+    return [replace(f, message=f.message.replace(TURN_ROUND, "")) for f in frames]
 
 
 def turned_round(frames: Sequence[Frame]) -> list[Frame]:

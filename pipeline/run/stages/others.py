@@ -150,4 +150,5 @@ def _outside(known: Known, wires: Mapping[int, Array], radius_mm: float) -> list
     turned = Counter(np.mean(_clearance(known, wires[n] * MIRROR) > radius_mm) < 0.5 * outside[n] for n in outside)
     hint = "; with x and y turned most would not: are they RAS?" if turned[True] > turned[False] else ""
     what = f"{100 * outside[worst]:.0f} % of the wire lies outside the lumen by more than its radius"
-    return [f"{counted(len(outside), 'frame')}: in frame {worst} {what}{hint}"]
+    several = f"{counted(len(outside), 'frame')}, the worst is " * (len(outside) > 1)
+    return [f"{several}frame {worst}: {what}{hint}"]
