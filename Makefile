@@ -157,7 +157,8 @@ $(VENV)/.ready: pyproject.toml requirements.lock
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --editable .
 	# where Python is told not to write bytecode (in containers) every start would read all sources anew: seconds. On
 	# all cores, and without others' tests, in half the time that pip takes for it
-	$(BIN)/python -m compileall -q -j 0 -x '/tests?/' $(VENV)/lib pipeline solver reports data_synthetic
+	-$(BIN)/python -m compileall -q -j 0 -x '/tests?/' $(VENV)/lib
+	$(BIN)/python -m compileall -q pipeline solver reports data_synthetic
 	$(BIN)/python -m pipeline.warm_up
 	touch $@
 

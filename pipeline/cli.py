@@ -65,8 +65,8 @@ def parsers() -> tuple[Parser, dict[str, Parser]]:
         prog="wireval",
         allow_abbrev=False,
         description="Validate simulated guide wires against 3D scans.",
-        epilog="Exit codes: 0 all ok; 1 some case failed or regressed; 2 input wrong, nothing run; 130 interrupted; "
-        "143 terminated.",
+        epilog="Exit codes: 0 all ok; 1 some case failed or regressed, or a gate closed; 2 input wrong, nothing run; "
+        "130 interrupted; 143 terminated.",
     )
     parser.add_argument("--version", action="store_true", help="print the version")
     shtab.add_argument_to(

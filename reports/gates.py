@@ -1,4 +1,4 @@
-"""What was asked of a whole run (``--fail-if``) and the answers, as ``gates.json`` has them for pages and notebooks."""
+"""What was asked of a whole run (``--fail-if``), and the answers as ``gates.json`` has them for pages and notebooks."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,8 +11,8 @@ GATES = "gates.json"
 
 
 def asked_of(out_dir: Path) -> list[str]:
-    """The conditions that runs into a folder were given, as typed, each once."""
-    return list(dict.fromkeys(text for run in runs_in(out_dir) for text in run.get("fail_if", ())))
+    """The conditions that the last run into a folder was given; an earlier one's, as of a shard, are given up."""
+    return list(next((run.get("fail_if", ()) for run in reversed(runs_in(out_dir))), ()))
 
 
 def closed_in(out_dir: Path) -> Sequence[str]:

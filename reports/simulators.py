@@ -80,8 +80,8 @@ def _said(alone: Mapping[Any, Any], folder: Path, lines: Sequence[str], copied: 
     missing, mixed, good = not_run_sentence(folder), why_not_pooled(folder), alone["frames_ok"]
     failed = f"On {good} of {alone['frames']} frames: " if good < alone["frames"] else ""
     closed = closed_in(folder)
-    status = "cases missing" if missing else "frames failed" if failed else "not pooled" if mixed else "ok"
-    status = "gate closed" if status == "ok" and closed else status
+    why = {"cases missing": missing, "frames failed": failed, "not pooled": mixed, "gate closed": closed}
+    status = next((word for word, so in why.items() if so), "ok")
     doubt = Doubt("" if missing or failed or mixed else copied, twins(doubted(folder)))
     said = verdict(row, alone["simulator"], doubt)
     lines = [line for line in lines if line != doubt.copied]

@@ -58,8 +58,8 @@ def _at_the_floor(statistics: Mapping[str, Any]) -> str:
     if not _number(statistics.get("rms_mm")) <= floor:
         return ""
     return (
-        f" By the traces' own standard deviation a perfect wire would lie {number(floor)} mm from them: what lies "
-        "nearer has their errors, and is not for that the better wire."
+        f" By the traces' own standard deviation a perfect wire would lie {number(floor)} mm from them: of two wires "
+        "that lie nearer than that, the nearer is not for that the better one."
     )
 
 

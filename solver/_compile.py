@@ -78,13 +78,13 @@ class _ByTypes(_Numbered):  # type: ignore[misc]
         """Keep what was compiled for a key: types, processor, hashes of the function's own code."""
         types = hashlib.sha256(repr(key[:2]).encode()).digest()
         name = self._data_name(int.from_bytes(types[:5]))
-        self._save_data(name, (key, data))
+        self._save_data(name, ((self._source_stamp, key), data))
         self._save_index(self._load_index() | {key: name})
 
     def load(self, key: tuple[Any, ...]) -> Any:
-        """What was kept for a key; None where there is none, or that of another one."""
+        """What was kept for a key; None where there is none, or that of another one, or of other sources behind it."""
         whose, data = super().load(key) or (None, None)
-        return data if whose == key else None
+        return data if whose == (self._source_stamp, key) else None
 
 
 def on_disk(**options: Any) -> Callable[[F], F]:

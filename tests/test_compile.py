@@ -72,9 +72,12 @@ def test_two_processes_that_compile_at_one_time_do_not_mix_their_code(package: s
     third = kept(numbered, "stamp")
     assert third.load(first) == "code for float32"
     assert third.load(second) in (None, "code for int16")
-    path = Path(third._data_path(third._load_index()[first]))
-    third._save_data(path.name, (second, "code for int16"))
+    name = third._load_index()[first]
+    third._save_data(name, (("stamp", second), "code for int16"))
     assert third.load(first) is None, "of another key, whatever its name"
+    third.save(first, "code for float32")
+    kept(numbered, "stamp of earlier sources")._save_data(name, (("stamp of earlier sources", first), "old code"))
+    assert third.load(first) is None, "of a process that began before an edit"
 
 
 def called(folder: Path, package: str) -> str:

@@ -32,7 +32,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def main(args: argparse.Namespace) -> int:
-    """Exit 0 if all cases are ok, 1 if some failed or are missing (but what --only left out), 2 if there are none."""
+    """Exit 0 if all cases are ok, 1 if some failed or are missing (but what --only left out) or a gate of the last run
+    closed, 2 if there are none.
+    """
     from pipeline.run.aggregate import aggregate
     from pipeline.run.last_words import last_line, lost_lines
     from pipeline.run.results import found_results
@@ -40,6 +42,7 @@ def main(args: argparse.Namespace) -> int:
     from reports.inside import misleading_links
     from reports.records import damaged_records
     from reports.run_page import render_index
+    from reports.simulators import folders_in
 
     found = found_results(args.out)
     if not found:
@@ -66,7 +69,8 @@ def main(args: argparse.Namespace) -> int:
 
         say(f"summary: {write_pdf(args.out)}")
     whole = _all_there(args.out, found if args.overview else ())
-    sys.stderr.writelines(f"{line}\n" for line in totals.closed)
+    first = next((f"{name}: " for name in folders_in(args.out)), "")
+    sys.stderr.writelines(f"{first}{line}\n" for line in totals.closed)
     say(last_line(totals, page))
     return 0 if totals.all_ok and not totals.closed and others_ok and drawn and whole else 1
 

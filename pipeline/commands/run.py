@@ -70,7 +70,6 @@ def _run(args: argparse.Namespace, gates: "Sequence[Gate]") -> int:
     from pipeline.run.launch import intention, launch
     from pipeline.run.results import found_results
     from pipeline.study.plausible import doubts
-    from reports.gates import open_in
 
     plan = _plan(args)
     if not plan.cases:
@@ -89,7 +88,7 @@ def _run(args: argparse.Namespace, gates: "Sequence[Gate]") -> int:
     if args.junit:
         write_tests(args.junit, {"": found_results(plan.out)}, totals.gates)
     _tell(plan, totals)
-    for line in () if plan.template.quiet else open_in(plan.out):
+    for line in () if plan.template.quiet else totals.opened:
         say(line)
     say(last_line(totals, index))
     return 0 if totals.all_ok and not totals.closed else 1

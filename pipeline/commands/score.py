@@ -50,7 +50,6 @@ def main(args: argparse.Namespace) -> int:
     from pipeline.status import InputError
     from pipeline.study.check import check
     from pipeline.study.others import named
-    from reports.gates import open_in
     from reports.inside import misleading_links
     from reports.schema import OURS, SIMULATORS, WHERE
     from reports.simulators import PAGE
@@ -73,7 +72,7 @@ def main(args: argparse.Namespace) -> int:
         say(line)
     if args.junit:
         _write_junit(args.junit, plans, totals)
-    for line in () if args.quiet else [f"{name}: {line}" for name, plan in plans.items() for line in open_in(plan.out)]:
+    for line in () if args.quiet else [f"{name}: {line}" for name, one in totals.items() for line in one.opened]:
         say(line)
     sys.stderr.writelines(f"{name}: {why}\n" for name, one in totals.items() for why in one.closed)
     return 0 if all(one.all_ok and not one.closed for one in totals.values()) else 1

@@ -18,6 +18,7 @@ from pipeline.run.gate import CLOSED, parsed
 from pipeline.run.kin import told_of_kin
 from pipeline.run.overall import Found, found_cases, frames_of, overall, shared_scans, strangers, validation
 from pipeline.run.results import Result, write_json
+from pipeline.status import UsageError
 from reports import tables
 from reports.case_files import GOOD, not_reached
 from reports.doubts import AMONG, copied_from_traces, doubted, warnings_in
@@ -33,7 +34,8 @@ class Totals:
     """The numbers of the last line. Errors are those of all points of the frames that are pooled, as in overall.csv.
 
     unscored : why there are no errors.     mixed : whether the reason is that settings or manifests differ.
-    gates : by each condition that was asked, why the run must not pass, empty where it may.
+    gates : by each condition that was asked, why the run must not pass, empty where it may.     opened : a sentence for
+    each of those.
     sweep_lost : cases that crashed at a point of a sweep; they are not counted in ``cases``.
     frames_fitted : scans that a roll was fitted on; they are not counted in ``frames``.
     """
@@ -49,6 +51,7 @@ class Totals:
     unscored: str = ""
     mixed: bool = False
     gates: Mapping[str, str] = field(default_factory=dict)
+    opened: Sequence[str] = ()
     sweep_lost: int = 0
     frames_fitted: int = 0
 
@@ -97,7 +100,7 @@ def aggregate(out: Path, run_info: dict[str, Any] | None = None, name: str = "ru
         whole,
         mixed or unscored((result.role, result.status) for result in found) or not_reached(out),
         bool(mixed),
-        _judged(out, whole),
+        *_judged(out, asked_of(out) if run_info is None else run_info.get("fail_if", ()), whole),
         frames_fitted=sum(row.get("frames_fitted") or 0 for row in rows),
     )
 
@@ -116,20 +119,26 @@ def _keep_what_is_seen(out: Path, found: Sequence[Result], among: Sequence[Found
         write_json(out / AMONG, {"assumptions": assumed, "doubts": doubts})
 
 
-def _judged(out: Path, overall: Mapping[str, Any]) -> dict[str, str]:
-    """By what the runs into ``out`` asked, why it must not pass, empty where it may; written for its page, too.
+def _judged(out: Path, asked: Sequence[str], overall: Mapping[str, Any]) -> tuple[dict[str, str], list[str]]:
+    """By each condition why a run must not pass, empty where it may, and what is said of those; also for its page.
 
-    Errors of wires that were made from the traces open no gate. overall : the row of the run.
+    Errors of wires that were made from the traces open no gate. overall : the row of the run into ``out``.
     """
-    asked = [parsed(text) for text in asked_of(out)]
     (out / GATES).unlink(missing_ok=True)
     if not asked:
-        return {}
+        return {}, []
     copied = copied_from_traces(warnings_in(out))  # reads the results of all cases
-    told = {g.asked: f"{CLOSED}: {g.asked}: {copied}" if copied else g.closed(overall) for g in asked}
-    opened = [f"gate open: {g.asked}: {g.column} is {float(overall[g.column]):.4g}" for g in asked if not told[g.asked]]
+    told, opened = {}, []
+    for text in asked:
+        try:
+            one = parsed(text)
+        except UsageError:  # written by another version
+            told[f"--fail-if {text}"] = f"{CLOSED}: --fail-if {text}: {OVERALL_FILE} of this version has no such number"
+            continue
+        told[one.asked] = why = f"{CLOSED}: {one.asked}: {copied}" if copied else one.closed(overall)
+        opened += [] if why else [one.open(overall)]
     write_json(out / GATES, {"closed": [why for why in told.values() if why], "open": opened})
-    return told
+    return told, opened
 
 
 def _times(out: Path, found: Sequence[Result]) -> tuple[pd.DataFrame, float]:

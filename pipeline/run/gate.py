@@ -31,16 +31,17 @@ class Gate:
 
     @property
     def text(self) -> str:
-        """The condition as it was typed."""
-        return f"{self.of}{':' * bool(self.of)}{self.column}{self.relation}{self.limit:.12g}"
+        """The condition in short."""
+        limit = f"{self.limit:g}" if float(f"{self.limit:g}") == self.limit else repr(self.limit)
+        return f"{self.of}{':' * bool(self.of)}{self.column}{self.relation}{limit}"
 
     @property
     def asked(self) -> str:
-        """The option as it was typed."""
+        """The option in short."""
         return f"--fail-if {self.text}"
 
     def asks(self, simulator: str) -> bool:
-        """Whether this simulator's wires are asked; without a name they are the run's only ones."""
+        """Whether this simulator's wires are asked; without a name those of each but the solver."""
         return simulator == self.of if self.of else simulator != OURS
 
     def closed(self, overall: Mapping[str, Any]) -> str:
@@ -57,6 +58,10 @@ class Gate:
             return f"{CLOSED}: {self.asked}: {OVERALL_FILE} has no {self.column}{why}; it cannot be shown to hold"
         passed = not RELATIONS[self.relation](value, self.limit)
         return "" if passed else f"{CLOSED}: {self.asked}: {self.column} is {value:.4g}"
+
+    def open(self, overall: Mapping[str, Any]) -> str:
+        """What is said of a run with this row that may pass."""
+        return f"gate open: {self.asked}: {self.column} is {float(overall[self.column]):.4g}"
 
 
 def gate(text: str, simulators: Sequence[str] = ()) -> Gate:

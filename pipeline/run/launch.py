@@ -204,11 +204,16 @@ def _never_asked(info: Path, left_out: Sequence[str]) -> list[str]:
 
 
 def _remove_records(out: Path, manifest: str) -> None:
-    """Remove what runs of other manifests say of themselves: shards, once all cases of another one were run."""
+    """Remove what runs of other manifests say of themselves: shards, once all cases of another one were run.
+
+    And what is damaged, which would keep pages from being drawn.
+    """
     for path in out.glob("run*.json"):
+        whose = ""
         with suppress(ValueError):
-            if read_json(path).get("manifest_sha256") != manifest:
-                path.unlink()
+            whose = read_json(path).get("manifest_sha256", "")
+        if whose != manifest:
+            path.unlink()
 
 
 def _remove_others(out: Path, manifest: str) -> None:

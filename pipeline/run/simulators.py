@@ -6,6 +6,7 @@ planned frames: a simulator gains nothing by failing in the hard ones.
 """
 
 from collections.abc import Iterator, Mapping, Sequence, Set
+from itertools import combinations
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -67,10 +68,25 @@ def write_comparison(out: Path, folders: Mapping[str, Path]) -> list[str]:
                 sentences.append("; ".join([said, *caveat]))
     tables.write(out / SIMULATORS.file, SIMULATORS, rows)
     tables.write(out / WHERE.file, WHERE, [] if mixed else list(_where(folders, judged, common, off)))
+    sentences += _twins(studies)
     none = [row["simulator"] for row in rows if row.get("frames_ok") == 0]
     if none and common and not mixed:
         sentences.append(f"who is nearest where is left out: no frame counts for {listed(none)}")
     return sentences
+
+
+def _twins(studies: Studies) -> list[str]:
+    """A sentence for every two simulators whose errors are the same at every point of all frames."""
+    of = {
+        name: {(case.result.case, n): frame.error_mm for case in validation(found) for n, frame in case.frames.items()}
+        for name, found in studies.items()
+    }
+    return [
+        f"{one} and {other} have the same error at every point of all {len(of[one])} frames: is one a copy?"
+        for one, other in combinations(of, 2)
+        if of[one] and of[one].keys() == of[other].keys()
+        if all(np.array_equal(error, of[other][frame]) for frame, error in of[one].items())
+    ]
 
 
 def _caveat(off: Set[str]) -> list[str]:

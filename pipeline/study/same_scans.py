@@ -106,12 +106,14 @@ def continued(cases: Sequence[Case]) -> list[str]:
 
 
 def _take_turns(cases: Sequence[Case]) -> bool:
-    """Whether the depths of cases, in order, are of one case after the other, round and round."""
+    """Whether the depths of cases, in order, are of one case after the other, round and round; one may be missing."""
     depths = sorted((depth, number) for number, case in enumerate(cases) for depth in case.insertion_mm or ())
     order, count = [number for _, number in depths], len(cases)
     apart = all(before < after for (before, _), (after, _) in pairwise(depths))
-    several = len(depths) >= 3 * count  # twice round and less is chance
-    return apart and several and len(set(order[:count])) == count and order[count:] == order[: len(order) - count]
+    again = sum(one == other for one, other in pairwise(order))
+    # twice round and less is chance; of each 2 n neighbours none is missing
+    whole = all(len(set(order[n : n + 2 * count])) == count for n in range(len(order) - 2 * count + 1))
+    return apart and whole and again <= 1 and len(order) >= 3 * count - 1
 
 
 def _place(source: Source) -> tuple[str, str]:

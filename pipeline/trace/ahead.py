@@ -73,7 +73,7 @@ def washed_out(image: Subtraction, points: Array, sigma: float) -> float:
     Where contrast medium is thin, a wire is as dark as the medium of the reference, and the difference shows none of
     it. image : before its background is levelled, which takes such places for the lumen's own.     sigma : blur.
     """
-    if image.modelled and image.levels["gain"] == 1.0:
+    if image.without_reference:
         return 0.0
     deep = image.deep(DEEP_BLUR)
     places = unflattened(deep, image.region.box.shape) * image.spacing

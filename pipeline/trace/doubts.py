@@ -55,7 +55,7 @@ def no_wire(image: Subtraction) -> Curve:
         got += (
             f" ({own:.0f} of them from voxel to voxel: the rest is no noise, but what the background does not explain)"
         )
-        if not image.modelled or image.levels["gain"] != 1.0:  # there is a reference
+        if not image.without_reference:
             do = f"check that the reference is of this phantom, in this place and of this contrast; {do}"
     return Curve(
         np.zeros((0, 3)), np.zeros(0), status=status, note=note_of(got, allowed, do),
@@ -89,7 +89,7 @@ def ends_in_nothing(image: Subtraction, tube: Tube, curve: Curve) -> Curve:
     return replace(curve, status=FrameStatus.TRACE_AMBIGUOUS, note=note_of(got, allowed, do))
 
 
-def unwashed(image: Subtraction, tube: Tube, curve: Curve) -> Curve:
+def not_washed_out(image: Subtraction, tube: Tube, curve: Curve) -> Curve:
     """The curve, or the same as ambiguous where the contrast medium about its end is so thin that a wire is not seen.
 
     image : before its background is levelled.

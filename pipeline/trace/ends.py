@@ -162,7 +162,8 @@ def of_the_lumen(image: Subtraction, attempt: Attempt, points: Array) -> tuple[O
         (thread_outside(image, points, attempt.tube.sigma), FrameStatus.TRACE_LEFT_LUMEN,
          f"a line as thin and as bright as the wire that leads on through tissue from {_named(image, points[-1])} mm, "
          "where the curve ends", "a lumen that holds the tip",
-         "look whether the wire leaves the vessel there; if that is a thin vessel, give a reference scan without wire"),
+         "look whether the wire leaves the vessel there; if that is a thin vessel, give a reference scan "
+         "without wire, or one with less noise"),
     )  # fmt: skip
 
 

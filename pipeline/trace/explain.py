@@ -25,7 +25,7 @@ from pipeline.trace.attempt import (
 )
 from pipeline.trace.config import TraceConfig
 from pipeline.trace.crests import SEED_SIGMAS, STRICT_BEND
-from pipeline.trace.doubts import doubted, no_wire, unwashed
+from pipeline.trace.doubts import doubted, no_wire, not_washed_out
 from pipeline.trace.noise import inflation
 from pipeline.trace.subtraction import Subtraction, levelled
 from pipeline.trace.tube import DIM_END, Tube, point_sigmas
@@ -187,7 +187,7 @@ def _model_error(image: Subtraction, best: Candidate) -> Array:
     controls = best.attempt.tube.controls
     rough = np.diff(controls, n=4, axis=0) if len(controls) > 4 else np.zeros((1, 3))
     bends = BEND_SHARE * float(np.sqrt(np.mean(rough**2)))
-    if not image.modelled or image.levels["gain"] != 1.0:
+    if not image.without_reference:
         return np.full(len(best.points), bends)
     depth = -image.depth_at(best.points) / image.voxel
     wall = WALL_ERROR * image.voxel * np.clip((WALL_REACH - depth) / 3.0, 0.0, 1.0)
@@ -258,4 +258,4 @@ def explained(image: Subtraction, entry: EntryPose, previous: Curve | None, conf
     attempt = bent(image, attempt, entry)
     if attempt is not best.attempt:
         best = _agreed(best, _read_off(image, attempt, entry)[0], modelled=image.modelled)
-    return doubted(image, best.attempt, unwashed(as_seen, best.attempt.tube, _curve(image, best)))
+    return doubted(image, best.attempt, not_washed_out(as_seen, best.attempt.tube, _curve(image, best)))

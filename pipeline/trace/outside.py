@@ -47,7 +47,7 @@ def _scanned(image: Subtraction, points: Array) -> Array:
 def seen_outside(image: Subtraction, line: Array) -> bool:
     """Whether the scan shows something as bright as the vessel, or a wire, just beyond the tip and outside the lumen.
 
-    Then it is the lumen that ends there, not the wire. Read in the scan itself, as nothing else is known out there.
+    Then it is the lumen that ends there, not the wire.
     """
     h, tip = image.voxel, line[-1]
     heading = tip_tangent(line, TANGENT_MM)
@@ -75,7 +75,7 @@ def thread_outside(image: Subtraction, line: Array, sigma: float) -> bool:
     Where the frame alone shows the vessel, a wire in tissue passes for a thin vessel, and nothing stands out in that:
     the curve ends where the wire leaves the wide one. Where there is a reference, that is no part of the lumen.
     """
-    if not image.modelled or image.levels["gain"] != 1.0:
+    if not image.without_reference:
         return False
     tissue, h = image.wall_greys[1], image.voxel
     usual = max(float(np.median(image.along(line[-round(TANGENT_MM / h) - 3 : -2]))), 1e-9)

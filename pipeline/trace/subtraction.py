@@ -84,6 +84,11 @@ class Subtraction:
         return float(self.spacing.min())
 
     @property
+    def without_reference(self) -> bool:
+        """Whether no reference scan was there, or none that shows less noise than the frame alone."""
+        return self.modelled and self.levels["gain"] == 1.0  # to the bit, where nothing was matched
+
+    @property
     def thick_slices(self) -> bool:
         """Whether slices are so much thicker than pixels that a round wire does not look it."""
         return bool(np.max(self.spacing) > 1.5 * self.voxel)

@@ -108,6 +108,7 @@ def read_results(out: str | Path) -> Results:
         raise InputError([f"{out}: no such folder; give one that `wireval run` wrote"])
     try:
         cases = {folder.name: read_case(folder, points=False) for folder in find_cases(out)}
+        _closed(out)
     except ValueError as error:
         raise InputError([str(error)]) from None
     if not cases:

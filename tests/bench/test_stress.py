@@ -267,6 +267,7 @@ def _crashes(seed: int, index: int) -> SceneOutcome:
     return SceneOutcome(index, ("roll",), "converged")
 
 
+@pytest.mark.slow
 def test_crash_and_hang_cost_themselves_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(study, "run_scene", _crashes)
     done = list(run_isolated(0, [0, 1, 0, 2, 3, 4, 5, 0], limit_s=0.5))

@@ -9,6 +9,7 @@ from tests.numbers.parts import PARTS
 from tests.unseen import unseen_figures as unseen_figures  # looked at before they are drawn
 
 SCENES, RELATIVE = PARTS["runs"]
+pytestmark = pytest.mark.slow  # what a run says is looked at in tests/pipeline each time
 
 
 @pytest.mark.parametrize("name", SCENES)

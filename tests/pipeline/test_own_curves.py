@@ -188,7 +188,7 @@ def test_a_clamp_of_the_same_curves_is_not_called_blind(tmp_path: Path, shorter_
     result = json.loads((tmp_path / "out/cases/copy/result.json").read_text(encoding="utf-8"))
     same = shorter_mm == 0.0 or bool(group)
     shares = "is of the same insertion (group 'A')" if group else "has scans of this case"
-    assert any(f"{shares}: it is not blind" in text for text in result["warnings"]) == same
+    assert any(f"{shares}: the clamp is not blind" in text for text in result["warnings"]) == same
     assert any("is blind to this case's scans" in text for text in result["assumptions"]) != same
 
 

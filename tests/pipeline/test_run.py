@@ -915,7 +915,7 @@ def test_a_borrowed_clamp_is_that_of_the_other_case(finished: Path, study: Path,
         json.loads((folder / "result.json").read_text(encoding="utf-8"))
         for folder in (finished / "cases" / "bifurcation", tmp_path / "out" / "cases" / "second")
     )
-    assert any("it is not blind to them" in line for line in borrowed["warnings"])
+    assert any("has scans of this case: the clamp is not blind" in line for line in borrowed["warnings"])
     np.testing.assert_array_equal(own["entry"]["used_mm"], borrowed["entry"]["used_mm"])
 
 

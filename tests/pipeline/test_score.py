@@ -94,7 +94,7 @@ def test_a_warning_of_one_simulator_bears_its_name() -> None:
     assert said_once(said) == ["scan", "theirs, third: mirrored", "third: jagged"]
 
 
-def test_own_wires_give_the_identical_table(tmp_path: Path) -> None:
+def test_own_wires_give_the_identical_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """And a third party's are told apart from one without the tip's curve; all beside each other, every page drawn."""
     manifest, run = synth("bend", tmp_path / "study"), tmp_path / "run"
     assert main(["run", str(manifest), "-o", str(run), "--until", "compare", *QUICK]) == 0
@@ -102,6 +102,7 @@ def test_own_wires_give_the_identical_table(tmp_path: Path) -> None:
     wanted = [str(curves), f"PyElastica={PEERS / 'bend'}", f"straight-tip={PEERS / 'bend-straight-tip'}"]
     out = tmp_path / "out"
     assert main(["score", str(manifest), *(x for c in wanted for x in ("--curves", c)), "-o", str(out), *QUICK]) == 0
+    assert "ours and wireval have the same error at every point of all 4 frames" in capsys.readouterr().out
     before, after = errors_of(run), errors_of(out)
     same = [c for c in before if not c.endswith("_s") and c not in (*SOLVERS, "max_penetration_mm")]
     pd.testing.assert_frame_equal(before[same], after[same], check_exact=True)

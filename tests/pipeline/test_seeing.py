@@ -267,8 +267,7 @@ def test_scans_whose_negative_grey_is_cut_off_at_0_are_no_copies(seed, lower):
     """Half of tissue about 0 is 0 in both: all were refused as copies, and the medium's level was off by a sixth."""
     scene = Draft(np.random.default_rng([seed, 77])).scan(16)
     frame, reference = (
-        replace(v, values=np.maximum(v.values.astype(int) - lower, 0).astype(np.uint16))
-        for v in (scene.frame, scene.reference)
+        replace(v, values=np.maximum(v.values - np.int16(lower), 0)) for v in (scene.frame, scene.reference)
     )
     curve = trace(frame, segment(reference, scene.entry[None]), scene.entry, scene.direction, reference=reference)
     assert curve.status is FrameStatus.OK, curve.note

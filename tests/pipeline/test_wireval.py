@@ -85,6 +85,22 @@ def test_a_run_gives_frames(study: Path, tmp_path: Path) -> None:
     assert "Gate closed: --fail-if rms_mm&gt;0.001: rms_mm is" in page
     assert "Gate open: --fail-if rms_mm&gt;9: rms_mm is" in page
     assert main(["report", str(tmp_path / "out"), "--overview"]) == 1
+    run_json = tmp_path / "out" / "run.json"
+    told = json.loads(run_json.read_text(encoding="utf-8"))
+    shard = {**told, "fail_if": ["rms_mm>0"]}
+    (tmp_path / "out" / "run.1-2.json").write_text(json.dumps(shard), encoding="utf-8")
+    begun = json.dumps({"started": "2001-01-01"})
+    (tmp_path / "out" / "provenance.1-2.json").write_text(begun, encoding="utf-8")
+    run_json.write_text(json.dumps({**told, "fail_if": ["rms_mm>9", "old_mm>1"]}), encoding="utf-8")
+    assert main(["report", str(tmp_path / "out"), "--overview"]) == 1
+    (why,) = wireval.read_results(tmp_path / "out").closed
+    assert why == "gate closed: --fail-if old_mm>1: overall.csv of this version has no such number", "not the shard's"
+    (tmp_path / "out" / "run.1-2.json").unlink()
+    (tmp_path / "out" / "gates.json").write_text('{"closed": 3}', encoding="utf-8")
+    with pytest.raises(wireval.InputError, match="closed is of another kind than expected"):
+        wireval.read_results(tmp_path / "out")
+    run_json.write_text(json.dumps(told), encoding="utf-8")
+    main(["report", str(tmp_path / "out"), "--overview"])
     verdict = wireval.diff(tmp_path / "out", tmp_path / "out")
     assert (verdict.closed, verdict.word) == (False, "not worse")
     assert repr(verdict).endswith("exit 0, the gate stays open")

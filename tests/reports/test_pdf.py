@@ -22,6 +22,7 @@ from tests.unseen import unseen as unseen
 def test_four_pages_say_verdict_failures_and_the_worst_case(tmp_path: Path) -> None:
     cases = (FakeCase("fine", frames=3), FakeCase("poor", frames=3, failed=(1,), error_mm=0.6))
     out = write_run(tmp_path / "out", cases)
+    (out / "gates.json").write_text('{"closed": ["gate closed: --fail-if x>1: x is 2"]}', encoding="utf-8")
     first = write_pdf(out).read_bytes()
     assert len(re.findall(rb"/Type /Page\b", first)) == 4
     assert write_pdf(out).read_bytes() == first
@@ -30,7 +31,7 @@ def test_four_pages_say_verdict_failures_and_the_worst_case(tmp_path: Path) -> N
     with undrawn():
         pages = [" ".join(text.get_text() for text in page.figure.texts) for page in pdf._pages(out, summary)]
     said = (
-        ("5 of 6 frames", "0.250 mm", "frame 1: no_wire", "--only poor"),
+        ("5 of 6 frames", "0.250 mm", "Gate closed: --fail-if x>1: x is 2.", "frame 1: no_wire", "--only poor"),
         ("Cases side by side", "poor: Skill against trivial predictors"),
         ("worst case: poor", "stands among the assumptions", "Worst frames by p95_mm"),
         ("solver.segment_mm", "frames_failed", "More of poor", "Error against insertion depth"),

@@ -48,7 +48,7 @@ def _of_another(run: Context, other: Case, given: Clamp, own: Sequence[Frame]) -
     if run.case.group == other.group:
         shares = f"is of the same insertion (group {other.group!r})"
     if shares:
-        told = "it is not blind to it; name a case of another insertion"
+        told = "the clamp is not blind to it; name a case of another insertion"
         run.log.warnings.append(f"the clamp is that of case {other.id!r}, which {shares}: {told}")
     else:
         blind = "the clamp is blind to this case's scans, it is that of case"
