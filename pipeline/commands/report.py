@@ -46,11 +46,7 @@ def main(args: argparse.Namespace) -> int:
 
     found = found_results(args.out)
     if not found:
-        above = [f"give {one}" for one in args.out.absolute().parents[:2] if found_results(one)]
-        begun = any(args.out.glob("run*.json"))
-        why = "the run into it has finished no case: run it again" if begun else "this is not an output of wireval run"
-        hint = next(iter(above), why)
-        return complain([f"{args.out}: no cases/*/result.json below it; {hint}"], str(args.out), "; nothing was drawn")
+        return complain([_without_cases(args.out)], str(args.out), "; nothing was drawn")
     links = misleading_links(args.out)
     if problems := links or damaged_records(args.out):
         return complain(problems, str(args.out), "; nothing was drawn")
@@ -73,6 +69,16 @@ def main(args: argparse.Namespace) -> int:
     sys.stderr.writelines(f"{first}{line}\n" for line in totals.closed)
     say(last_line(totals, page))
     return 0 if totals.all_ok and not totals.closed and others_ok and drawn and whole else 1
+
+
+def _without_cases(out: Path) -> str:
+    """What is wrong with a folder without results."""
+    from pipeline.run.results import found_results
+
+    above = [f"give {one}" for one in out.absolute().parents[:2] if found_results(one)]
+    begun = any(out.glob("run*.json"))
+    why = "the run into it has finished no case: run it again" if begun else "this is not an output of wireval run"
+    return f"{out}: no cases/*/result.json below it; {next(iter(above), why)}"
 
 
 def _all_there(out: Path, found: Sequence["Result"], name: str = "") -> bool:
