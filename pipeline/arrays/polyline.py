@@ -72,6 +72,13 @@ def tangents(curve_mm: ArrayLike, arc_mm: Array, reach_mm: float) -> Array:
     return np.asarray(chords / np.maximum(np.linalg.norm(chords, axis=1), 1e-12)[:, None])
 
 
+def across(directions: Array) -> Array:
+    """Two vectors (..., 2, 3) across directions (..., 3) and each other, the first of length 1, the second as long."""
+    first = np.cross(directions, np.eye(3)[np.argmin(np.abs(directions), axis=-1)])
+    first /= np.maximum(np.linalg.norm(first, axis=-1, keepdims=True), 1e-12)
+    return np.stack([first, np.cross(directions, first)], axis=-2)
+
+
 def turns_deg(curve_mm: Array, apart: int) -> Array:
     """Angles (m,), degrees, between the segments of a polyline (n, 3) that are ``apart`` segments from each other."""
     along = np.diff(curve_mm, axis=0)

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import chdtri, fdtri
 
-from pipeline.arrays.polyline import tangents
+from pipeline.arrays.polyline import across, tangents
 from pipeline.model import Array
 
 COVERED = 0.95
@@ -28,11 +28,7 @@ class Judged(NamedTuple):
 
 def axes_across(curve_mm: Array, arc_mm: Array) -> Array:
     """Two unit vectors (n, 2, 3) across a curve (m, 3) at arc lengths (n,)."""
-    along = tangents(curve_mm, arc_mm, TANGENT_MM)
-    least = np.eye(3)[np.argmin(np.abs(along), axis=1)]
-    first = np.cross(along, least)
-    first /= np.maximum(np.linalg.norm(first, axis=1), 1e-12)[:, None]
-    return np.stack([first, np.cross(along, first)], axis=1)
+    return across(tangents(curve_mm, arc_mm, TANGENT_MM))
 
 
 def widening(count: int) -> float:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from pipeline.arrays.jets import smooth_voxels
+from pipeline.arrays.polyline import across
 from pipeline.segment.levels import BRIGHTER, GreyLevels, Index
 from pipeline.segment.necks import runs_along
 from solver.grid import Array, Grid
@@ -105,9 +106,8 @@ def _end_like(scene: _Scene, at: Array, normal: Array) -> _Rays:
     room = np.min(np.minimum(at, np.array(scene.scan.shape) - 1.0 - at) * spacing, axis=1)
     left = np.flatnonzero((radius >= h) & (room > FLANK * radius + h))
     mm = normal * spacing
-    u = np.cross(mm, np.eye(3)[np.argmin(np.abs(mm), axis=1)])
-    u /= np.linalg.norm(u, axis=1)[:, None]
-    v, low = np.cross(mm, u), at - (BELOW * radius)[:, None] * normal
+    u, v = np.moveaxis(across(mm), 1, 0)
+    low = at - (BELOW * radius)[:, None] * normal
     for turn in np.pi * TURNS:
         aside = (FLANK * radius[left])[:, None] * (np.cos(turn) * u[left] + np.sin(turn) * v[left]) / spacing
         left = left[(scene.depth(low[left] + aside) < 0) | (scene.depth(low[left] - aside) < 0)]

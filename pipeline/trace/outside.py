@@ -6,7 +6,7 @@ Read in the scan, as nothing else is known out there.
 import numpy as np
 
 from pipeline.arrays.jets import Blurred, values_at
-from pipeline.arrays.polyline import tip_tangent
+from pipeline.arrays.polyline import across, tip_tangent
 from pipeline.model import Array
 from pipeline.trace.onward import RAY_MM, RAY_STEP, TANGENT_MM
 from pipeline.trace.section import PHI, RING_BLURS
@@ -99,6 +99,5 @@ def thread_outside(image: Subtraction, line: Array, sigma: float) -> bool:
 
 def _rings(ways: Array) -> Array:
     """Unit vectors (n, ANGLES, 3) across directions (n, 3)."""
-    across = np.cross(ways, np.eye(3)[np.argmin(np.abs(ways), axis=1)])
-    across /= np.linalg.norm(across, axis=1)[:, None]
-    return np.asarray(np.cos(PHI)[:, None] * across[:, None] + np.sin(PHI)[:, None] * np.cross(ways, across)[:, None])
+    first, second = np.moveaxis(across(ways), 1, 0)
+    return np.asarray(np.cos(PHI)[:, None] * first[:, None] + np.sin(PHI)[:, None] * second[:, None])

@@ -9,6 +9,7 @@ from functools import cache
 import numpy as np
 
 from pipeline.arrays.grids import spread, unflattened
+from pipeline.arrays.polyline import across
 from pipeline.model import Array
 from pipeline.trace.subtraction import Subtraction
 
@@ -54,9 +55,8 @@ def _rings(widest: float, step: float) -> Array:
 
 def cone(heading: Array, widest: float, step: float) -> Array:
     """Directions (..., n, 3) up to ``widest`` (rad) off headings (..., 3), ``step`` apart."""
-    side = np.cross(heading, np.eye(3)[np.argmin(np.abs(heading), axis=-1)])
-    side /= np.linalg.norm(side, axis=-1, keepdims=True)
-    return np.asarray(_rings(widest, step) @ np.stack([heading, side, np.cross(heading, side)], axis=-2))
+    axes = np.concatenate([heading[..., None, :], across(heading)], axis=-2)
+    return np.asarray(_rings(widest, step) @ axes)
 
 
 def _longer(
