@@ -88,15 +88,20 @@ class UsageError(InputError):
     place = "the command line"
 
 
-def did_you_mean(key: str, allowed: Iterable[str]) -> str:
-    """Sentence naming the nearest allowed key, whatever its capitals, or all of them.
+def nearest(key: str, allowed: Iterable[str]) -> str:
+    """The allowed key that is nearest, whatever its capitals; empty where none is near.
 
     A key that lacks nothing but the end of an allowed one, as its unit, is nearest to that, or ``_median`` before it.
     """
-    names, low = sorted(allowed), key.lower()
-    small = {name.lower(): name for name in names}
+    low, small = key.lower(), {name.lower(): name for name in sorted(allowed)}
     longer = sorted((name for name in small if name.startswith(f"{low}_")), key=len)
     stem, _, unit = low.rpartition("_")
     median = f"{stem}_median_{unit}"
     close = [low] * (low in small) or [median] * (median in small) or longer or get_close_matches(low, small, n=1)
-    return f"did you mean {small[close[0]]!r}?" if close else f"allowed: {', '.join(names)}"
+    return small[close[0]] if close else ""
+
+
+def did_you_mean(key: str, allowed: Iterable[str]) -> str:
+    """Sentence naming the nearest allowed key, or all of them."""
+    names = sorted(allowed)
+    return f"did you mean {near!r}?" if (near := nearest(key, names)) else f"allowed: {', '.join(names)}"

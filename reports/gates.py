@@ -15,11 +15,7 @@ def asked_of(out_dir: Path) -> list[str]:
     return list(next((run.get("fail_if", ()) for run in reversed(runs_in(out_dir))), ()))
 
 
-def closed_in(out_dir: Path) -> Sequence[str]:
-    """A sentence for each gate of a run, or of one simulator of a score, that is closed."""
-    return list(read_json(out_dir / GATES).get("closed", ()))
-
-
-def open_in(out_dir: Path) -> Sequence[str]:
-    """A sentence for each that is open."""
-    return list(read_json(out_dir / GATES).get("open", ()))
+def gates_in(out_dir: Path) -> dict[str, Sequence[str]]:
+    """A sentence for each gate of a run, or of one simulator of a score: those that are ``closed``, and ``open``."""
+    told = read_json(out_dir / GATES)
+    return {name: told.get(name, ()) for name in ("closed", "open")}

@@ -15,7 +15,7 @@ from reports.case_files import WORST, CaseFiles, counted, not_reached, not_run_s
 from reports.counts import scans
 from reports.doubts import assumed, copied_from_traces, doubted, said_by_cases, twins
 from reports.figures import declared, figures_of
-from reports.gates import closed_in
+from reports.gates import gates_in
 from reports.origin import why_not_pooled
 from reports.pdf_page import RIGHT, WIDE, Figured, Page
 from reports.records import read_json
@@ -79,7 +79,7 @@ def _first(out_dir: Path, summary: pd.DataFrame, whole: pd.DataFrame) -> Page:
     if fitted := int(summary["frames_fitted"].sum()):
         frames = scans(ok, planned, fitted, "with a result")
     page.text(f"{counted(len(summary), 'case')}, {frames}. {said}", size=11)
-    for line in closed_in(out_dir):
+    for line in gates_in(out_dir)["closed"]:
         page.text(f"{line[0].upper()}{line[1:]}.", size=11, colour=colours.BAD)
     if worse := worse_sentence(summary.to_dict("records")):
         page.text(worse, size=11, colour=colours.BAD)

@@ -27,7 +27,7 @@ from reports.case_page import case_failures, scored_or_ok, version_of
 from reports.counts import scans
 from reports.doubts import assumed, copied_from_traces, doubted, said_by_cases, twins
 from reports.figures import RunFiles, declared
-from reports.gates import closed_in, open_in
+from reports.gates import gates_in
 from reports.origin import why_not_pooled
 from reports.page import Each, draw_sections, one_by_one, write_page
 from reports.records import read_json
@@ -52,10 +52,10 @@ def render_index(out_dir: Path, embed: bool = False, each: Each = one_by_one) ->
     infos = list(runs.values())
     row = dict(whole.iloc[0]) if len(whole) else {}
     uncounted = damaged | set(summary["case"][summary["role"] == "calibration"])
-    missing, doubts = not_run(out_dir), doubted(out_dir)
+    missing, doubts, gates = not_run(out_dir), doubted(out_dir), gates_in(out_dir)
     mixed, cases_said = why_not_pooled(out_dir), zip(summary["role"], summary["status"], strict=True)
     why_none = mixed or unscored(cases_said) or not_reached(out_dir)
-    status = _status(out_dir, [f for f in failures if not _of_another(f)], mixed) if cases else "failures"
+    status = _status(not (cases and all(map(_of_another, failures))), missing, mixed, gates["closed"])
     page = {
         **_headline(cases, missing, damaged),
         **_judged(cases, doubts, status, row, why_none),
@@ -66,7 +66,7 @@ def render_index(out_dir: Path, embed: bool = False, each: Each = one_by_one) ->
         "failures": alike(failures),
         "beside_others": (out_dir / SIMULATORS.file).exists(),
         **_not_counted(out_dir),
-        "gates": {"closed": closed_in(out_dir), "open": open_in(out_dir)},
+        "gates": gates,
         "assumptions": assumed(out_dir),
         "warnings": [*doubts, *said_by_cases({case.name: case.result for case in cases}, "warnings")],
         "numbers": _content.in_tiles(_content.overall(declared("overall"), whole)),
@@ -132,13 +132,10 @@ def readable_cases(out_dir: Path) -> tuple[list[CaseFiles], list[dict[str, Any]]
     return cases, broken
 
 
-def _status(out_dir: Path, failures: Sequence[Any], mixed: str) -> str:
+def _status(failed: bool, missing: Sequence[str], mixed: str, closed: Sequence[str]) -> str:
     """The worst that can be said of a run in a word or two."""
-    if failures:
-        return "failures"
-    if not_run(out_dir):
-        return "cases missing"
-    return "not pooled" if mixed else "gate closed" if closed_in(out_dir) else "ok"
+    words = {"failures": failed, "cases missing": missing, "not pooled": mixed, "gate closed": closed}
+    return next((word for word, so in words.items() if so), "ok")
 
 
 def _worse_cases(summary: pd.DataFrame, links: Mapping[str, str]) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from reports import _content
 from reports.case_files import counted, listed, not_reached, not_run_sentence
 from reports.doubts import copied_from_traces, doubted, twins, warnings_in
 from reports.figures.simulators import SimulatorFiles, leads
-from reports.gates import closed_in
+from reports.gates import gates_in
 from reports.origin import why_not_pooled
 from reports.page import draw_sections, write_page
 from reports.schema import OURS, OVERALL_FILE, SIMULATORS, SUMMARY, WHERE, Column
@@ -79,7 +79,7 @@ def _said(alone: Mapping[Any, Any], folder: Path, lines: Sequence[str], copied: 
         row.pop("skill", None)
     missing, mixed, good = not_run_sentence(folder), why_not_pooled(folder), alone["frames_ok"]
     failed = f"On {good} of {alone['frames']} frames: " if good < alone["frames"] else ""
-    closed = closed_in(folder)
+    closed = gates_in(folder)["closed"]
     why = {"cases missing": missing, "frames failed": failed, "not pooled": mixed, "gate closed": closed}
     status = next((word for word, so in why.items() if so), "ok")
     doubt = Doubt("" if missing or failed or mixed else copied, twins(doubted(folder)))

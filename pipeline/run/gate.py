@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from pipeline.status import UsageError, did_you_mean
+from pipeline.status import UsageError, did_you_mean, nearest
 from reports.schema import OURS, OVERALL_FILE, SUMMARY
 from reports.texts import NUMBER
 
@@ -80,8 +80,8 @@ def _instead(column: str, names: Sequence[str]) -> str:
     """What may be meant by a column that is no number of overall.csv; of its 60 numbers a few."""
     if column in SUMMARY.names:
         return f": it is a text; {A_FEW}"
-    nearest = did_you_mean(column, names)
-    return f"; {nearest if nearest.startswith('did you mean') else A_FEW}"
+    near = nearest(column, names)
+    return f"; did you mean {near!r}?" if near else f"; {A_FEW}"
 
 
 def parsed(text: str) -> Gate:

@@ -44,8 +44,10 @@ from reports.records import read_json
 from reports.run_page import render_index
 from reports.schema import FAILURES, OVERALL_FILE, SUMMARY, SWEEP, TIMINGS
 
-TABLES = SUMMARY.file, OVERALL_FILE, FAILURES.file, TIMINGS.file, SWEEP.file
-OVER_ALL = *TABLES, AMONG, GATES, "index.html", "summary.pdf"
+OVER_ALL = (
+    *(SUMMARY.file, OVERALL_FILE, FAILURES.file, TIMINGS.file, SWEEP.file),
+    *(AMONG, GATES, "index.html", "summary.pdf"),
+)
 """Files over all cases. They go before the first case is computed: a run that is ended would leave those of an earlier
 one, all ok, beside cases of its own."""
 

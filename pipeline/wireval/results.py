@@ -15,7 +15,7 @@ from pipeline.run.results import Result, found_results
 from pipeline.status import InputError, did_you_mean
 from reports import tables
 from reports.case_files import CaseFiles, amiss, find_cases, listed, not_run, read_case
-from reports.gates import closed_in
+from reports.gates import gates_in
 from reports.origin import why_not_pooled
 from reports.schema import ERRORS, FAILURES, OVERALL_FILE, POINTS, SIMULATORS, SUMMARY, SWEEP, WHERE, Table
 from reports.simulators import folders_in
@@ -108,7 +108,7 @@ def read_results(out: str | Path) -> Results:
         raise InputError([f"{out}: no such folder; give one that `wireval run` wrote"])
     try:
         cases = {folder.name: read_case(folder, points=False) for folder in find_cases(out)}
-        _closed(out)
+        closed = _closed(out)
     except ValueError as error:
         raise InputError([str(error)]) from None
     if not cases:
@@ -117,7 +117,7 @@ def read_results(out: str | Path) -> Results:
     damaged = {one.case: one.failures[0]["message"] for one in results if one.status == "damaged"}
     for message in damaged.values():
         warnings.warn(f"{message}; its errors are left out", stacklevel=2)
-    found = _results(out, cases, tuple(damaged))
+    found = _results(out, cases, closed, tuple(damaged))
     if others := _tables_of_others(found, [one for one in results if one.status != "damaged"]):
         warnings.warn(f"{others}; `wireval report {out}` writes them anew", stacklevel=2)
     return replace(found, other_tables=others)
@@ -126,7 +126,7 @@ def read_results(out: str | Path) -> Results:
 def _closed(out: Path) -> tuple[str, ...]:
     """A sentence for each closed gate of a run; of a score, of every simulator that was asked."""
     of = {f"{name}: ": folder for name, folder in folders_in(out).items()} or {"": out}
-    return tuple(f"{whose}{why}" for whose, folder in of.items() for why in closed_in(folder))
+    return tuple(f"{whose}{why}" for whose, folder in of.items() for why in gates_in(folder)["closed"])
 
 
 def _tables_of_others(found: Results, results: Sequence[Result]) -> str:
@@ -155,10 +155,10 @@ def _alike(row: Mapping[Any, Any], other: Mapping[str, Any]) -> bool:
 
 def read_run(out: Path) -> Results:
     """What a run has just left: nothing, in empty tables, where it was a shard that got none of the cases."""
-    return read_results(out) if find_cases(out) else _results(out, {})
+    return read_results(out) if find_cases(out) else _results(out, {}, _closed(out))
 
 
-def _results(out: Path, cases: dict[str, CaseFiles], damaged: tuple[str, ...] = ()) -> Results:
+def _results(out: Path, cases: dict[str, CaseFiles], closed: tuple[str, ...], damaged: tuple[str, ...] = ()) -> Results:
     def table(kind: Table, name: str = "") -> pd.DataFrame:
         return tables.read_if_there(out / (name or kind.file), kind)
 
@@ -168,7 +168,7 @@ def _results(out: Path, cases: dict[str, CaseFiles], damaged: tuple[str, ...] = 
     whole = table(SUMMARY, OVERALL_FILE)
     errors = _of_all({name: case.errors for name, case in cases.items() if name not in damaged}, ERRORS)
     beside = table(FAILURES), table(SWEEP), table(SIMULATORS), table(WHERE)
-    return Results(out, table(SUMMARY), whole, errors, *beside, Cases(cases), _closed(out), damaged)
+    return Results(out, table(SUMMARY), whole, errors, *beside, Cases(cases), closed, damaged)
 
 
 def _of_all(by_case: dict[str, pd.DataFrame], kind: Table) -> pd.DataFrame:
