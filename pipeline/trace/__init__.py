@@ -21,7 +21,17 @@ from pipeline.trace.stated import Opacity
 from pipeline.trace.subtraction import subtracting
 from pipeline.trace.whose_end import BEYOND_GAP, DIM_FROM_TIP, GAP, cleared
 
-__all__ = ["BEYOND_GAP", "DIM_FROM_TIP", "GAP", "GOES_ON", "cleared", "of_catheter", "of_length", "trace"]
+__all__ = [
+    "BEYOND_GAP",
+    "DIM_FROM_TIP",
+    "GAP",
+    "GOES_ON",
+    "cleared",
+    "hardly_begun",
+    "of_catheter",
+    "of_length",
+    "trace",
+]
 
 THICK_VOXELS = 1.6
 """Blur of a wire, from which its crest wanders: the ends of such wires, 0.9 mm in voxels of 0.15 mm, were 2 voxels off
@@ -123,10 +133,6 @@ def of_catheter(curve: Curve, catheter_mm: float) -> Curve:
     return replace(curve, status=FrameStatus.TRACE_AMBIGUOUS, note=note, levels=levels)
 
 
-TURN_ROUND = "; or entry_direction points back along the wire: turn it round"
-"""Advice on a trace that has hardly begun."""
-
-
 def of_length(curve: Curve, expected_mm: float | None, config: TraceConfig) -> Curve:
     """The curve, traced or given; an OK one whose length is too far from the expected one gets LENGTH_MISMATCH."""
     if curve.status is not FrameStatus.OK or missed_mm(curve.length_mm, expected_mm, config) == 0:
@@ -134,8 +140,6 @@ def of_length(curve: Curve, expected_mm: float | None, config: TraceConfig) -> C
     note = f"trace: length: got {curve.length_mm:.2f} mm; expected {expected_mm:.2f} mm (insertion_mm) to within "
     note += f"{config.length_tolerance_mm} mm; look at the picture, then correct the manifest or "
     note += "trace.length_tolerance_mm"
-    if hardly_begun(curve.length_mm, expected_mm):
-        note += TURN_ROUND
     if expected_mm and (unit := unit_of(curve.length_mm / expected_mm, UNIT_ROOM)):
         note += f"; it would do in {unit}: give mm"
     return replace(curve, status=FrameStatus.LENGTH_MISMATCH, note=note)

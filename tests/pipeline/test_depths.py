@@ -12,7 +12,7 @@ from pipeline.run.log import Log
 from pipeline.run.stages.depths import (
     in_another_order,
     in_step,
-    not_to_be_turned,
+    perhaps_turned,
     shrinking,
     standing,
     stated_elsewhere,
@@ -109,11 +109,6 @@ def test_frames_in_another_order_are_named_as_such() -> None:
     for lengths in (DEPTHS[:5], [10.0, 14.0, 12.0, 22.0, 26.0], [d + 3.0 for d in DEPTHS[:5]]):
         other = frames(lengths, DEPTHS[:5])
         assert not in_another_order(other, from_entry(other), 2.0)
-    wrong = of_length(seen[0].curve, 180.0, TraceConfig())
-    assert "turn it round" in wrong.note
-    (told,) = not_to_be_turned([seen[0].traced_by(wrong)])
-    assert "turn it round" not in told.message
-    assert "correct the manifest or trace.length_tolerance_mm" in told.message
     unknown = frames(DEPTHS[:2], [float("nan")] * 2)
     assert not in_another_order(unknown, from_entry(unknown), 2.0)
 
@@ -249,10 +244,13 @@ def test_a_tip_behind_the_entry_names_entry_direction() -> None:
 
 
 def test_a_trace_that_hardly_begins_may_run_the_wrong_way() -> None:
-    short, long = (of_length(f.curve, 14.0, TraceConfig()) for f in frames([0.1, 9.0], DEPTHS[:2]) if f.curve)
-    assert "entry_direction points back along the wire" in short.note
-    assert long.status is FrameStatus.LENGTH_MISMATCH
-    assert "entry_direction" not in long.note
+    seen = [replace(f, expected_mm=14.0) for f in frames([0.1, 9.0, 14.0], DEPTHS[:3])]
+    seen = [f.traced_by(of_length(f.curve, 14.0, TraceConfig())) for f in seen if f.curve]
+    short, long, right = perhaps_turned(seen)
+    assert short.message.endswith("or entry_direction points back along the wire: turn it round")
+    assert long.status == short.status == "length_mismatch"
+    assert "entry_direction" not in long.message
+    assert right == seen[2]
 
 
 def test_a_direction_turned_round_is_said_once_for_all_frames() -> None:

@@ -15,7 +15,7 @@ from pipeline.model import Array, Clamp
 from pipeline.run.stages.known import Frame
 from pipeline.simulate.clamp import depth_from
 from pipeline.status import FrameStatus
-from pipeline.trace import TURN_ROUND
+from pipeline.trace import hardly_begun
 
 AROUND = 5
 """Number of neighbouring frames whose median difference of traced length and stated depth is the usual one."""
@@ -124,9 +124,14 @@ def in_another_order(frames: Sequence[Frame], depths_mm: Mapping[int, float], to
     ]
 
 
-def not_to_be_turned(frames: Sequence[Frame]) -> list[Frame]:
-    """The frames, where they are known to be in another order: none that is told to turn its direction round."""
-    return [replace(f, message=f.message.replace(TURN_ROUND, "")) for f in frames]
+def perhaps_turned(frames: Sequence[Frame]) -> list[Frame]:
+    """The frames; one that is refused for its length, and whose trace has hardly begun, may run the wrong way."""
+    wrong = FrameStatus.LENGTH_MISMATCH.identifier
+    advice = "or entry_direction points back along the wire: turn it round"
+    short = [
+        f.curve is not None and f.status == wrong and hardly_begun(f.curve.length_mm, f.expected_mm) for f in frames
+    ]
+    return [replace(f, message=f"{f.message}; {advice}") if so else f for f, so in zip(frames, short, strict=True)]
 
 
 def turned_round(frames: Sequence[Frame]) -> list[Frame]:

@@ -20,7 +20,7 @@ from pipeline.run.stages.beside import beside_what_is_seen
 from pipeline.run.stages.depths import (
     in_another_order,
     in_step,
-    not_to_be_turned,
+    perhaps_turned,
     shrinking,
     standing,
     stated_elsewhere,
@@ -86,7 +86,7 @@ def _in_step(run: Context, frames: list[Frame], voxel_mm: float) -> list[Frame]:
     depths_mm = traced_depths(frames, run.case.entry_mm, run.case.entry_direction)
     swapped = in_another_order(frames, depths_mm, tolerance_mm)
     run.log.warnings += swapped
-    frames = not_to_be_turned(frames) if swapped else frames
+    frames = frames if swapped else perhaps_turned(frames)
     run.log.warnings += stated_elsewhere(frames, depths_mm, tolerance_mm)
     frames = in_step(to_depth(frames, depths_mm, tolerance_mm), voxel_mm)
     run.log.warnings += [*shrinking(frames, voxel_mm), *standing(frames, voxel_mm)]
