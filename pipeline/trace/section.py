@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from pipeline.model import Array
 from pipeline.trace.profile import INDEPENDENT_VOXELS
+from pipeline.trace.sharpness import blur_by_axis
 from pipeline.trace.subtraction import CREST_VOXELS, Subtraction
 
 ANGLES = 12
@@ -40,9 +41,6 @@ TURNS, TURNING, SURE_TURNING = np.arange(0.22, 0.43, 0.02), 0.012, 4.0
 away (pitches of 2.4 to 4.5 mm), the least mean harmonic over STRETCH_MM, turned back, of such a pair, and its standard
 deviations. Blur leaves 0.03 of 0.4 mm wires in contact with a pitch of 4 mm and 0.02 with one of 3, 6 standard
 deviations and more; right lines had up to 2.7, and 0.008 where noise allows less than 0.005."""
-MOST_OF_SCANNER = 0.045
-"""The most that a scanner's own blur, sharper along one of its axes than along another, makes of that: a ratio of 1.2
-makes 0.04 where the wire lies across. Two wires 0.5 mm apart have up to 0.07."""
 TWISTS, SURE_TWISTED = (-0.2, -0.15, -0.1, -0.05, 0.05, 0.1, 0.15, 0.2), 2.7
 """Turns per mm of two wires about each other that are looked for, so near each other that what is averaged over OVER_MM
 stays in phase: pitches from 4.5 mm up. Four standard deviations, as the largest of several is taken."""
@@ -113,8 +111,11 @@ class Section:
         return np.asarray(np.abs(mean) / np.maximum(self.grey, least), float)
 
 
-def section_along(image: Subtraction, points: Array, read: tuple[Array, Array]) -> Section:
-    """The section along a curve (n, 3). read : of ``read_around``."""
+def section_along(image: Subtraction, points: Array, read: tuple[Array, Array], sigma: float) -> Section:
+    """The section along a curve (n, 3) of blur ``sigma``, without what the scanner makes of a round wire's.
+
+    read : of ``read_around``.
+    """
     ring, grey = read
     step = float(np.mean(np.linalg.norm(np.diff(points, axis=0), axis=1)))
     width = min(len(points), max(1, round(OVER_MM / step)))
@@ -123,7 +124,8 @@ def section_along(image: Subtraction, points: Array, read: tuple[Array, Array]) 
     independent = max(1.0, min(OVER_MM, width * step) / (INDEPENDENT_VOXELS * image.voxel))
     usual = max(float(np.median(axis)), 1e-9)
     noise = float(image.noise_in(CREST_VOXELS) * np.sqrt(4.0 / ANGLES / independent) / usual)
-    return Section(second_harmonic(ring), axis, step, window, noise)
+    harmonic = second_harmonic(ring) - _of_the_scanner(image, points, sigma) * axis
+    return Section(harmonic, axis, step, window, noise)
 
 
 def paired(image: Subtraction, section: Section, length_mm: float) -> float:
@@ -139,10 +141,10 @@ def paired(image: Subtraction, section: Section, length_mm: float) -> float:
     return float(np.sqrt(max(0.0, *left))) / (PAIRED * (1.0 + _unevenness(image)))
 
 
-def paired_in_part(image: Subtraction, section: Section, fitted: NDArray[np.complex128], points: Array) -> float:
+def paired_in_part(image: Subtraction, section: Section, fitted: NDArray[np.complex128]) -> float:
     """The same over STRETCH_MM alone, where that says most, side by side or closely twisted.
 
-    fitted : harmonic (n,) of the fitted tube, which is not round on the rings of a sharp bend.     points : (n, 3).
+    fitted : harmonic (n,) of the fitted tube, which is not round on the rings of a sharp bend.
     """
     width = round(STRETCH_MM / section.step_mm)
     if width > len(section.grey):
@@ -151,7 +153,6 @@ def paired_in_part(image: Subtraction, section: Section, fitted: NDArray[np.comp
     grey = np.maximum(np.convolve(section.grey, window, "valid"), usual)  # that of a coil is its own
     of_noise = section.noise * np.sqrt(OVER_MM / STRETCH_MM) * usual / grey
     rest = section.harmonic - fitted
-    rest = rest - _of_the_scanner(rest, section.grey, points)
 
     def mean(harmonic: NDArray[np.complex128]) -> Array:
         return np.asarray(np.abs(np.convolve(harmonic, window, "valid")) / grey)
@@ -165,16 +166,15 @@ def paired_in_part(image: Subtraction, section: Section, fitted: NDArray[np.comp
     return max(twisted, float(beyond.max()) / (STRETCHED * (1.0 + _unevenness(image))))
 
 
-def _of_the_scanner(harmonic: NDArray[np.complex128], grey: Array, points: Array) -> NDArray[np.complex128]:
-    """The part of a harmonic (n,) that a blur which differs along the scan's axes explains best, by least squares.
+def _of_the_scanner(image: Subtraction, points: Array, sigma: float) -> NDArray[np.complex128]:
+    """The harmonic (n,) over the grey on the axis of a round wire, blurred by a scanner less sharp along some axes.
 
-    Scanners are as sharp along their axis as across it to 10 or 20 %, which makes every round wire as oblong as two.
+    A blur whose square is larger by D across the wire makes exp(-x^2 / 2 s^2) larger by x^2 D / 2 s^4.
     """
     u, v = carried(_directions(points))
-    shapes = (u + 1j * v).T ** 2 * grey
-    design = np.concatenate([shapes.real, shapes.imag], axis=1).T
-    blur = np.linalg.lstsq(design, np.concatenate([harmonic.real, harmonic.imag]), rcond=None)[0]
-    return np.asarray(min(1.0, MOST_OF_SCANNER / max(float(np.ptp(blur)), 1e-12)) * blur @ shapes)
+    seen, radius = sigma**2 + (CREST_VOXELS * image.voxel) ** 2, RING_BLURS * sigma
+    usual = np.exp(-0.5 * radius**2 / seen) * radius**2 / (4.0 * seen**2)
+    return np.asarray(usual * (u + 1j * v) ** 2 @ blur_by_axis(image, points, sigma))
 
 
 def _unevenness(image: Subtraction) -> float:

@@ -156,7 +156,7 @@ def judge(image: Subtraction, attempt: Attempt, points: Array, bridged: NDArray[
     known = seen_steps(attempt.tube.steps, _shares(attempt.tube, points))
     faint = (share < FAINT + noise) & (ends > MEAN_OVER_MM) & ~known
     read = read_around(image, points, attempt.tube.sigma)
-    section = section_along(image, points, read)
+    section = section_along(image, points, read, attempt.tube.sigma)
     double = beside_itself(points, step, BESIDE_VOXELS * image.voxel)
     if not image.thick_slices:
         alone = share / of_one_strand(share, (ends > MEAN_OVER_MM) & ~bridged & ~faint)
@@ -167,7 +167,7 @@ def judge(image: Subtraction, attempt: Attempt, points: Array, bridged: NDArray[
     objections += _of_the_line(image, attempt, points, (share, noise, outside), (faint_mm, double_mm, length_mm))
     folded = bool(beside_itself(points, step, TIP_BESIDE * image.voxel)[-1])
     fitted = as_fitted(image, attempt.tube, points)
-    pair = 0.0 if image.thick_slices else _pair(image, section, fitted, points, length_mm)
+    pair = 0.0 if image.thick_slices else _pair(image, section, fitted, length_mm)
     objections += of_a_pair(pair, attempt)
     objections += of_the_ends(image, attempt, points, length_mm, folded=folded) + of_the_lumen(image, attempt, points)
     objections += of_its_width(image, attempt, points, (read, fitted), folded=folded)
@@ -176,9 +176,9 @@ def judge(image: Subtraction, attempt: Attempt, points: Array, bridged: NDArray[
     return Verdict(*first, bridged | faint | double | outside, faint_mm, double_mm)
 
 
-def _pair(image: Subtraction, section: Section, fitted: tuple[Array, Array], points: Array, length_mm: float) -> float:
+def _pair(image: Subtraction, section: Section, fitted: tuple[Array, Array], length_mm: float) -> float:
     """How far out of round the line is, all along or in part, over what one wire's may be."""
-    in_part = paired_in_part(image, section, second_harmonic(fitted[0]), points)
+    in_part = paired_in_part(image, section, second_harmonic(fitted[0]))
     return max(paired(image, section, length_mm), in_part)
 
 
