@@ -24,14 +24,15 @@ OVER_MM = 3.0
 """Length over which the harmonic is averaged: over less, a crossing stands out."""
 
 
-PAIRED = 0.03
-"""Median harmonic from which a line is two wires in contact all along: two have 0.031 and more (0.3 to 0.5 mm wires in
-voxels of 0.3 mm), one has 0.022 and less. Uneven voxels make a round wire oblong by 0.018 at 1.6 to 1."""
+PAIRED = 0.025
+"""Median harmonic from which a line is two wires in contact all along: two have 0.028 and more (0.3 to 0.5 mm wires in
+voxels of 0.3 mm, blurred alike or 1.3 times as much along one axis), one has 0.02 and less, but 1 of 60 0.027, beside
+a wall that no reference shows. Uneven voxels make a round wire oblong by 0.018 at 1.6 to 1."""
 MEDIAN = 1.18
 """Median of a complex number's size over the standard deviation of its parts."""
 SURE = 2.0
 """Three standard deviations of the median of n independent ones, over that median, times the square root of n."""
-STRETCH_MM, STRETCHED, SURE_STRETCH = 10.0, 0.024, 3.0
+STRETCH_MM, STRETCHED, SURE_STRETCH = 10.0, 0.02, 3.0
 """Length over which alone two wires may lie so that they are seen as two, the mean harmonic there from which they are,
 and standard deviations of that mean: bends turn the offset of a copy moved aside into the wires' own direction, and the
 rest of the line is as round as one. Right lines have up to 0.015 beyond noise where the background was measured; where

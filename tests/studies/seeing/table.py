@@ -124,13 +124,23 @@ LUMENS = (
 )  # fmt: skip
 
 
-def found(name, seed, **otherwise):
-    """A scene, its lumen and its curve. otherwise : what the manifest says instead."""
-    scene = CASES[name](np.random.default_rng([seed, list(CASES).index(name)]), seed)
+def scene_of(name, seed):
+    """A scene of a case."""
+    return CASES[name](np.random.default_rng([seed, list(CASES).index(name)]), seed)
+
+
+def seen(scene, **otherwise):
+    """The lumen and the curve of a scene. otherwise : what the manifest says instead."""
     radius = None if scene.reference else scene.wire_radius
     lumen = segment(scene.reference or scene.frame, scene.entry[None], wire_radius_mm=radius)
     stated = scene.stated | otherwise
-    return scene, lumen, trace(scene.frame, lumen, scene.entry, scene.direction, reference=scene.reference, **stated)
+    return lumen, trace(scene.frame, lumen, scene.entry, scene.direction, reference=scene.reference, **stated)
+
+
+def found(name, seed, **otherwise):
+    """A scene, its lumen and its curve. otherwise : what the manifest says instead."""
+    scene = scene_of(name, seed)
+    return scene, *seen(scene, **otherwise)
 
 
 def look(name, seed, **otherwise):
