@@ -18,6 +18,8 @@ THINNED, LEAST_PLACES = 5, 1000
 CELL_MM, LEAST_IN_CELL = 6.0, 2.0
 """Cells in which the medium is as bright all over, and how much of a step one has to hold: contrast that decays along
 the vessel by 60 % passes for a blur otherwise, as the vessel turns."""
+UNUSUAL = 1.5
+"""Times the mean square that is left in most cells, from which on the wall there is no vessel's, but a bone's."""
 
 
 def blur_by_axis(image: Subtraction, points: Array, sigma: float) -> Array:
@@ -26,11 +28,7 @@ def blur_by_axis(image: Subtraction, points: Array, sigma: float) -> Array:
     points, sigma : the wire's curve (n, 3) and blur, which is left out.  The profile of a wall with the unit normal n
     is as wide as the sum of n_k^2 times the square of the blur along axis k; a wall that lies off, or bends, moves it.
     """
-    box, blur = image.region.box.values, image.wall_blur_mm
-    at = image.region.sample[::THINNED]
-    at = at[np.all((at > 0) & (at < np.array(box.shape) - 1), axis=1)]
-    at = at[np.abs(box[tuple(at.T)]) < WALL_BLURS * blur]
-    at = at[cKDTree(points).query(at * image.spacing)[0] > CLEAR_BLURS * sigma]
+    box, blur, at = image.region.box.values, image.wall_blur_mm, _beside_wall(image, points, sigma)
     if len(at) < LEAST_PLACES:
         return np.zeros(3)
     rise = np.stack([box[tuple((at + step).T)] - box[tuple((at - step).T)] for step in np.eye(3, dtype=int)], axis=1)
@@ -42,12 +40,31 @@ def blur_by_axis(image: Subtraction, points: Array, sigma: float) -> Array:
     cell = np.ravel_multi_index(tuple(cells), tuple(cells.max(axis=1) + 1))
     level, height = _step_in(cell, ndtr(-depth), grey)
     known = height > 0.0
+    if np.count_nonzero(known) < LEAST_PLACES:
+        return np.zeros(3)
     share, density = (grey - level)[known] / height[known], np.exp(-0.5 * depth**2) / np.sqrt(2.0 * np.pi)
     wider = (rise**2 / steep[:, None]) * (0.5 * depth * density / blur**2)[:, None]
-    design = np.column_stack([wider, density])[known]
-    left = [_beside_step(cell[known], ndtr(-depth[known]), column) for column in (*design.T, share)]
-    found = np.linalg.lstsq(np.column_stack(left[:-1]), left[-1], rcond=None)[0][:3]
+    design, cell = np.column_stack([wider, density])[known], cell[known]
+    left = np.column_stack([_beside_step(cell, ndtr(-depth[known]), column) for column in (*design.T, share)])
+    found = np.linalg.lstsq(left[:, :-1], left[:, -1], rcond=None)[0]
+    even = _usual(cell, (left[:, -1] - left[:, :-1] @ found) * height[known])
+    found = np.linalg.lstsq(left[even, :-1], left[even, -1], rcond=None)[0][:3]
     return np.asarray(found - found.mean())
+
+
+def _beside_wall(image: Subtraction, points: Array, sigma: float) -> NDArray[np.int64]:
+    """Voxels (n, 3) of the box near the wall and away from the wire."""
+    box = image.region.box.values
+    at = image.region.sample[::THINNED]
+    at = at[np.all((at > 0) & (at < np.array(box.shape) - 1), axis=1)]
+    at = at[np.abs(box[tuple(at.T)]) < WALL_BLURS * image.wall_blur_mm]
+    return np.asarray(at[cKDTree(points).query(at * image.spacing)[0] > CLEAR_BLURS * sigma])
+
+
+def _usual(cell: NDArray[np.int64], rest: Array) -> NDArray[np.bool_]:
+    """Which places lie in cells that leave no more of the grey unexplained, ``rest`` (n,), than most cells do."""
+    square = np.bincount(cell, rest**2) / np.maximum(np.bincount(cell), 1)
+    return np.asarray(square[cell] < UNUSUAL * np.median(square[cell]))
 
 
 def _step_in(cell: NDArray[np.int64], step: Array, values: Array) -> tuple[Array, Array]:
