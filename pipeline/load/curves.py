@@ -86,6 +86,10 @@ def read_csv_points(path: Path) -> NDArray[np.float64]:
         raise refused(path, f"two columns {twice[0]}", "one of each", "leave out the other")
     if columns is None and any(c and not _is_number(c) for c in head[:3]):
         raise unusable(path, _without_points(head))
+    wide = next((n for n, row in enumerate(rows) if any(cell.strip() for cell in row[len(head) :])), None)
+    if wide is not None:  # 1,5,2,0,3,1 below three names was read as 1, 5, 2
+        got = f"{len(rows[wide])} values in row {wide} below {len(head)} columns"
+        raise refused(path, got, "as many", "write decimals with a point, and values separated by commas")
     if columns is None and len(head) != 3:
         raise unusable(path, f"has {len(head)} columns without names; expected x, y, z; name them above the table")
     try:

@@ -6,17 +6,10 @@ from pathlib import Path
 
 from pipeline.load.geometry import refused, unusable
 from pipeline.load.outside import UNITS_MM
-from pipeline.load.surfaces import space_of
+from pipeline.load.surfaces import SPACE, named_space, space_of
 from pipeline.load.tables import rows_of
 
 HEAD = 4096  # bytes of a file of 3D Slicer or VTK in which it says what it is
-_LPS, _RAS = "left[ _-]*posterior[ _-]*superior", "right[ _-]*anterior[ _-]*superior"
-_SPACE = re.compile(
-    rf"(?<![a-z])(?:space|coordinate[ _-]?system)\"?\s*[:=]\s*\"?"
-    rf"({_LPS}|{_RAS}|[RL][AP][SI]\b|[01](?![.,]?\d))",
-    re.IGNORECASE,
-)
-_SPACES = {"1": "LPS", "0": "RAS"}  # as 3D Slicer numbers them
 _UNIT = re.compile(r"(?:units?|coordinateUnits)\"?\s*[:=]\s*\"?([A-Za-zµμ]+)|lengths in (\w+)", re.IGNORECASE)
 _SPEAKS = re.compile(r"(?<![a-z])ras(?![a-z])|right[ _-]*anterior", re.IGNORECASE)
 
@@ -29,15 +22,10 @@ def stated_in(path: Path, kind: str) -> tuple[str, str]:
         head = file.read(HEAD).decode("latin-1")
     # 3D Slicer's files: LPS and mm unless they say otherwise; in VTK's it writes the space
     slicer, vtk = kind == ".mrk.json", space_of(head.encode("latin-1"))
-    space, unit = _SPACE.search(head), _UNIT.search(head)
-    said = _named(space) if space else "LPS" if slicer else vtk
-    return said, (unit[1] or unit[2]).lower() if unit else "mm" if slicer or vtk else ""
-
-
-def _named(space: re.Match[str]) -> str:
-    """The space that a match of ``_SPACE`` names, in three letters."""
-    word = space[1].upper()
-    return _SPACES.get(word, {"L": "LPS", "R": "RAS"}[word[0]] if len(word) > 3 else word)
+    unit = _UNIT.search(head)
+    return vtk or "LPS" * slicer, (unit[1] or unit[2]).lower() if unit else "mm" if slicer or (
+        vtk and "SPACE" in head
+    ) else ""
 
 
 def _of_table(path: Path) -> tuple[str, str]:
@@ -48,9 +36,9 @@ def _of_table(path: Path) -> tuple[str, str]:
     rows, comments = rows_of(path)
     names = {c.strip().lower() for c in rows[0]} if rows else set()
     default = ("LPS", "mm") if {"x_mm", "y_mm", "z_mm"} <= names else ("", "")
-    spaces = [match for line in comments for match in _SPACE.finditer(line)]
+    spaces = [match for line in comments for match in SPACE.finditer(line)]
     units = [(match[1] or match[2]).lower() for line in comments for match in _UNIT.finditer(line)]
-    other = next((name for name in map(_named, spaces) if name not in ("LPS", "RAS")), None)
+    other = next((name for name in map(named_space, spaces) if name not in ("LPS", "RAS")), None)
     if other:
         raise refused(path, f"space {other}", "LPS or RAS", "turn the wire's axes, and write '# space: LPS'")
     spoken = next((line for line in (*comments, *sorted(names)) if _SPEAKS.search(line)), None)
@@ -58,7 +46,7 @@ def _of_table(path: Path) -> tuple[str, str]:
         why = f"a line speaks of RAS ({spoken.strip()[:60]!r}), but the space is taken from '# space: RAS' alone"
         raise unusable(path, f"{why}; write it so, or '# space: LPS' if that is what it is in")
     _require_one(path, spaces, units, default)
-    return _named(spaces[0]) if spaces else default[0], units[0] if units else default[1]
+    return named_space(spaces[0]) if spaces else default[0], units[0] if units else default[1]
 
 
 def _require_one(path: Path, spaces: Sequence[re.Match[str]], named: list[str], default: tuple[str, str]) -> None:
@@ -66,7 +54,7 @@ def _require_one(path: Path, spaces: Sequence[re.Match[str]], named: list[str], 
     units = {unit: UNITS_MM.get(unit, unit) for unit in named}
     if units and default[1]:
         units[default[1]] = UNITS_MM[default[1]]
-    for said in ({match[1].upper(): _named(match) for match in spaces}, units):
+    for said in ({match[1].upper(): named_space(match) for match in spaces}, units):
         if len(set(said.values())) > 1:
             got = " and ".join(sorted(said))
             where = "in the comments of its table" + ", or its columns (x_mm)" * (said is units)

@@ -31,22 +31,37 @@ _TYPES = {
 }  # fmt: skip
 
 
-_IN_COMMENT = re.compile(rb"SPACE\"?\s*[:=]\s*\"?(LPS|RAS)")
+_LPS, _RAS = "left[ _-]*posterior[ _-]*superior", "right[ _-]*anterior[ _-]*superior"
+SPACE = re.compile(
+    rf"(?<![a-z])(?:space|coordinate[ _-]?system)\"?\s*[:=]\s*\"?"
+    rf"({_LPS}|{_RAS}|[RL][AP][SI]\b|[01](?![.,]?\d))",
+    re.IGNORECASE,
+)
+_SPACES = {"1": "LPS", "0": "RAS"}  # as 3D Slicer numbers them
 _IN_FIELD = re.compile(rb"Name=\"SPACE\"[^>]*>([\d\s]*)<")  # the text as character codes
 
 
+def named_space(space: re.Match[str]) -> str:
+    """The space that a match of ``SPACE`` names, in three letters."""
+    word = space[1].upper()
+    return _SPACES.get(word, {"L": "LPS", "R": "RAS"}[word[0]] if len(word) > 3 else word)
+
+
 def space_of(head: bytes) -> str:
-    """LPS or RAS as the beginning of a file of 3D Slicer says: in a comment, or in VTK's field data; else empty."""
-    if said := _IN_COMMENT.search(head):
-        return said[1].decode()
+    """The space that the beginning of a file states: in a comment, or in VTK's field data; else empty."""
+    if said := SPACE.search(head.decode("latin-1")):
+        return named_space(said)
     if field := _IN_FIELD.search(head):
         return "".join(map(chr, map(int, field[1].split()))).strip("\0")
     return ""
 
 
-def to_lps(text: bytes, points: NDArray[np.float64]) -> NDArray[np.float64]:
+def to_lps(path: Path, text: bytes, points: NDArray[np.float64]) -> NDArray[np.float64]:
     """Points (n, 3) of a file in LPS mm, which is what a file that states no space is taken for."""
-    return points * RAS_TO_LPS if space_of(text[:4096]) == "RAS" else points
+    space = space_of(text[:4096])
+    if space not in ("", "LPS", "RAS"):
+        raise refused(path, f"space {space}", "LPS or RAS", "export it in one of these")
+    return points * RAS_TO_LPS if space == "RAS" else points
 
 
 class _Vtp:
@@ -187,7 +202,7 @@ def read_vtp(path: Path) -> Shapes:
         if node.get("NumberOfComponents", "3") != "3":
             got = f"Points of {node.get('NumberOfComponents')} numbers each"
             raise refused(path, got, 'NumberOfComponents="3"', "write it again")
-        points = reachable(path, to_lps(file.head, file.array(node).astype(np.float64).reshape(-1, 3)))
+        points = reachable(path, to_lps(path, file.head, file.array(node).astype(np.float64).reshape(-1, 3)))
         _require_count(path, piece, "Points", len(points))
         fans = [
             np.stack([np.full(len(p) - 2, p[0]), p[1:-1], p[2:]], axis=1)
@@ -220,4 +235,4 @@ def read_stl(path: Path) -> Shapes:
     if len(corners) == 0 or len(corners) % 3:
         raise refused(path, f"{len(corners)} corners", "triangles", "export a triangle surface as .stl")
     points, index = np.unique(reachable(path, corners), axis=0, return_inverse=True)
-    return Shapes(to_lps(raw, points), index.reshape(-1, 3).astype(np.int64))
+    return Shapes(to_lps(path, raw, points), index.reshape(-1, 3).astype(np.int64))

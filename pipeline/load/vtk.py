@@ -81,7 +81,7 @@ def read_vtk_points(path: Path) -> Array:
     except (IndexError, KeyError, ValueError):
         got = "something else than numbers in POINTS or LINES"
         raise refused(path, got, "a polyline", "export the wire as .csv or .vtp") from None
-    return to_lps(file.raw, one_chain(path, points, cells) if cells else points)
+    return to_lps(path, file.raw, one_chain(path, points, cells) if cells else points)
 
 
 def _lines(file: _Legacy, count: int) -> list[NDArray[np.int64]]:

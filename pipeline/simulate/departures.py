@@ -60,7 +60,7 @@ def beside(curves: Sequence[Curve], given: Clamp, sigma_mm: float, voxel_mm: flo
         f"the traced wires pass {off:.2f} mm beside the manifest's entry (median of {len(starts)} "
         f"frame{'s' * (len(starts) != 1)}), {off / known:.0f} times the {known:.2g} mm that entry_sigma_mm = "
         f"{sigma_mm:.3g} and a trace's own error allow; the wire is simulated from the manifest's entry all the same: "
-        "check entry_mm, or let the clamp be estimated (entry_sigma_mm above 0 and simulate.entry = traced)"
+        "check entry_mm, or let the clamp be estimated (a larger entry_sigma_mm and simulate.entry = traced)"
     )
 
 
@@ -80,7 +80,7 @@ def turned(pairs: Sequence[tuple[Array, Array]]) -> str:
     return (
         f"in their first {FIRST_MM[1]:g} mm the traced wires point {off:.0f} degrees away from the simulated ones "
         f"(median of {frames}), which leave in entry_direction as stated: check it, or let the clamp be estimated "
-        "(entry_direction_sigma_deg above 0 and simulate.entry = traced)"
+        "(a larger entry_direction_sigma_deg and simulate.entry = traced)"
     )
 
 

@@ -111,6 +111,11 @@ def test_the_row_over_all_rests_on_the_insertions(out: Path) -> None:
             "entry_direction_sigma_deg = 0\nentry_direction = [0.14, 0.0, 0.99] #",
             "degrees away from the simulated",
         ),
+        (
+            "entry_direction = ",
+            "entry_direction_sigma_deg = 1e-6\nentry_direction = [0.14, 0.0, 0.99] #",
+            "degrees away from the simulated",
+        ),
         ("entry_direction = ", "entry_direction_sigma_deg = 0\nentry_direction = ", ""),
     ],
 )

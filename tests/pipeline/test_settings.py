@@ -13,7 +13,7 @@ from pipeline.model import Curve, Lumen
 from pipeline.run.cache import Store
 from pipeline.run.hashing import file_hash
 from pipeline.run.store import digest, key_of
-from pipeline.run.sweep import unchanged
+from pipeline.run.sweep import points_of, unchanged
 from pipeline.segment import segment
 from pipeline.segment.config import SegmentConfig
 from pipeline.status import FrameStatus
@@ -146,3 +146,11 @@ def test_the_plain_value_of_a_sweep_is_the_setting_or_what_all_cases_state(setti
     cases = [SimpleNamespace(wall=SimpleNamespace(friction=f)) for f in frictions]
     assert unchanged(plain, cases, "simulate.friction") == said
     assert unchanged(plain, cases, "simulate.roll_offset_deg") == "0"
+
+
+@pytest.mark.parametrize("text", ["compare.simulated_nulls=true,false", "budget.members=200", "budget.seed=1"])
+def test_a_sweep_of_what_its_points_leave_out_is_refused(text: str) -> None:
+    """Each had a row under its name that was computed without."""
+    with pytest.raises(SettingsError, match="changes no number"):
+        points_of([text], [])
+    assert len(points_of(["compare.skip_mm=5,6"], [])) == 2

@@ -6,7 +6,8 @@ import json
 import re
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pandas as pd
@@ -14,9 +15,11 @@ import pytest
 from numpy.typing import NDArray
 
 from pipeline.cli import main
+from pipeline.compare.config import CompareConfig
 from pipeline.compare.views import screen_of, shift_of
 from pipeline.load.geometry import LoadError
-from pipeline.load.views import CArm, read_views
+from pipeline.load.views import CArm, View, read_views
+from pipeline.run.stages.views import _far_shifts, _limited
 from tests.pipeline.known_study import QUICK, Known, errors_of, peers, run_known, simulated, write_csv
 
 Array = NDArray[np.float64]
@@ -168,6 +171,32 @@ def test_no_skill_where_the_registration_is_worse_than_the_vessel_is_wide(known:
     assert re.search(said, result["warnings"][0])
     assert "skill" not in {k for k, v in result["summary"].items() if v is not None}
     assert errors_of(tmp_path / "out")["rms_mm"].notna().all()
+
+
+@pytest.mark.parametrize(("across_mm", "doubted"), [(0.0, False), (6.0, False), (37.0, True)])
+def test_a_shift_that_no_patient_makes_is_told(across_mm: float, doubted: bool) -> None:
+    """A wire seen 37 mm beside the simulated one was shifted onto it and scored, ok, without a word."""
+    arm, wire = c_arm(), helix()
+    axes = screen_of(arm.matrix, CENTRE, seen(arm, wire)).axes
+    view = View(arm.matrix, CENTRE, CENTRE, seen(arm, wire + across_mm * axes[0]), True)
+    frame = SimpleNamespace(ok=True, comparison=True, view=view, simulated=SimpleNamespace(joints_mm=wire))
+    said = _far_shifts(cast(Any, [frame, frame]))
+    assert len(said) == doubted
+    assert all("wires of 2 frames were shifted by up to 37 mm" in text for text in said), said
+
+
+@pytest.mark.parametrize(
+    ("off_mm", "fitted", "limited"), [(1.7, False, False), (2.2, False, True), (2.2, True, False), (3.8, True, True)]
+)
+def test_a_centreline_may_be_two_radii_off_where_it_is_shifted(
+    monkeypatch: pytest.MonkeyPatch, off_mm: float, fitted: bool, limited: bool
+) -> None:
+    """A wire that was projected exactly had no skill: its vessel's middle, shifted onto it, lay 2.2 mm off."""
+    monkeypatch.setattr("pipeline.run.stages.views._radii", lambda *_: np.array([1.8]))
+    view = SimpleNamespace(fitted=fitted)
+    frame = SimpleNamespace(ok=True, nulls_rms_mm={"centreline": off_mm}, view=view)
+    clues = SimpleNamespace(centreline=helix())
+    assert bool(_limited(cast(Any, [frame]), cast(Any, clues), CompareConfig())) == limited
 
 
 def test_a_wire_too_short_for_a_shift_fails_by_name(known: Known, tmp_path: Path) -> None:

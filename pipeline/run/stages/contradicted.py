@@ -22,6 +22,8 @@ square. Of a wire turned by 60 degrees or more, the right roll is that."""
 FEWEST = 3
 """Frames from which that says something: of one, which any small cause may bend, half the distance is no news."""
 ENDS = "whether the traces end where the wire does, which a stated insertion_mm tells (a faint tip is not seen)"
+SURE_DEG = 0.1
+"""Standard deviation of a direction above which traces that speak against it move it so far that the estimate tells."""
 FRAME_NEARER, LEAST_MM = 0.4, 0.3
 """The same for a frame alone, whose wire may have let go, and the least rms distance that is worth a word there."""
 
@@ -63,8 +65,8 @@ def contradicted(
 
 
 def _leave_elsewhere(known: Known) -> str:
-    """What ``turned`` says of a clamp whose direction was not estimated."""
-    if known.clamp is None or known.clamp.sigma_deg > 0.0:
+    """What ``turned`` says of a clamp whose direction was not estimated, or is stated so well that it hardly moves."""
+    if known.clamp is None or known.clamp.sigma_deg > SURE_DEG:
         return ""
     pairs = [
         (frame.solved.joints_mm, curve.points_mm)

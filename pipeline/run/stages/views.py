@@ -10,13 +10,17 @@ from pipeline.arrays.polyline import at_arc
 from pipeline.compare import Comparison
 from pipeline.compare.config import CompareConfig
 from pipeline.compare.nulls import NULLS, TOLD, Clues, PredictorInputs
-from pipeline.compare.views import Screen, counted, nulls_in, pair_in, screen_of, values_in
+from pipeline.compare.views import Screen, counted, nulls_in, pair_in, screen_of, shift_of, values_in
 from pipeline.load.views import View
 from pipeline.model import Array
 from pipeline.run.stages.known import Context, Frame, Known
 from pipeline.run.stages.rivals import rival_ways, rival_wires, simulated_rivals
 from pipeline.simulate import wall_of
 from pipeline.status import FrameStatus
+from reports.case_files import counted as number_of
+
+FAR_SHIFT_MM = 10.0
+"""A fitted shift beyond which a registration is doubted: a patient moves by some millimetres."""
 
 
 def compare_in_views(run: Context, known: Known) -> tuple[Frame, ...]:
@@ -35,6 +39,7 @@ def compare_in_views(run: Context, known: Known) -> tuple[Frame, ...]:
         "distances are in the plane through the isocentre, parallel to the detector; each wire, predictors too, was "
         + (how if views[0].fitted else "taken where it lies: no translation was fitted")
     )
+    run.log.warnings += _far_shifts(frames)
     if not limited:
         return tuple(frames)
     # a wire cannot lie farther from its vessel's middle than the vessel's radius: the rest is a registration error
@@ -76,14 +81,35 @@ def screen_seen(view: View) -> Screen:
     return screen_of(view.matrix, view.isocentre_mm, view.points_px)
 
 
+def _far_shifts(frames: Sequence[Frame]) -> list[str]:
+    """A warning of shifts that no patient makes: a wire that lies elsewhere would be scored as if it lay there."""
+    shifts = [
+        shift_of(screen_seen(frame.view), np.asarray(frame.simulated.joints_mm), frame.view.fitted)
+        for frame in frames
+        if frame.ok and frame.comparison and frame.view is not None and frame.simulated is not None
+    ]
+    far = [mm for mm in map(float, map(np.linalg.norm, shifts)) if mm > FAR_SHIFT_MM]
+    if not far:
+        return []
+    return [
+        f"the wires of {number_of(len(far), 'frame')} were shifted by up to {max(far):.0f} mm to lie on what was seen, "
+        f"of which no error tells (doubted from {FAR_SHIFT_MM:g} mm on): check isocentre_mm, matrix, c_arm, points_px "
+        'and the depths; with translation = "none" it is in the errors'
+    ]
+
+
 def _limited(frames: Sequence[Frame], clues: Clues, config: CompareConfig) -> str:
-    """A warning where even the centreline lies farther from the wire than the lumen's radius; empty elsewhere."""
+    """A warning where even the centreline lies farther from the wire than the lumen's radius; empty elsewhere.
+
+    Where shifts are fitted, than twice that: the wire lies up to a radius off its middle in the part that is fitted,
+    and as far on the other side in the part that is scored.
+    """
     known = [frame for frame in frames if frame.ok and "centreline" in frame.nulls_rms_mm]
     if not known or clues.centreline is None:
         return ""
     off = float(np.sqrt(np.mean([frame.nulls_rms_mm["centreline"] ** 2 for frame in known])))
     radius = float(np.median(np.concatenate([_radii(frame, clues, config) for frame in known])))
-    if off <= radius:
+    if off <= radius * (2.0 if known[0].view is not None and known[0].view.fitted else 1.0):
         return ""
     return (
         f"registration-limited: centreline {off:.1f} mm in a lumen of {radius:.1f} mm radius; no skill can be claimed"
