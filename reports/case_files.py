@@ -22,7 +22,7 @@ WORST = "p95_mm"
 _MOST_NAMED = 5
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class CaseFiles:
     """What is on disk of one case; absent tables are empty, an absent result.json is an empty mapping.
 
@@ -36,6 +36,10 @@ class CaseFiles:
     timings: pd.DataFrame
     scan: ScanCrop | None
     frames: tuple[int, ...]
+
+    def __repr__(self) -> str:
+        """What a prompt shows: where it lies and how many frames have arrays; not all that was read."""
+        return f"CaseFiles({str(self.folder)!r}, {self.result.get('status', 'no result')}, {len(self.frames)} frames)"
 
     @property
     def name(self) -> str:

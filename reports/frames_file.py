@@ -54,7 +54,7 @@ class Straightened(NamedTuple):
     normal: Array
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class FrameArrays:
     """Arrays of one frame; what does not apply is None.
 
@@ -81,6 +81,11 @@ class FrameArrays:
     median_mm: Array | None = None
     covariance_mm2: Array | None = None
     straightened: Straightened | None = None
+
+    def __repr__(self) -> str:
+        """What a prompt shows: which arrays there are, and of what shape."""
+        shapes = [f", {name} {one.shape}" for name in _ARRAYS if (one := getattr(self, name)) is not None]
+        return f"FrameArrays(frame {self.frame}{''.join(shapes)})"
 
     @property
     def curves(self) -> dict[str, Array]:

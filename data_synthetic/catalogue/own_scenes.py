@@ -8,7 +8,7 @@ import numpy as np
 
 from data_synthetic.anatomy.centrelines import read_tree
 from data_synthetic.anatomy.from_tree import way_through
-from data_synthetic.catalogue.scene import NamedScene, Setup, spread
+from data_synthetic.catalogue.scene import NamedScene, Setup, name_after, spread
 from data_synthetic.geometry import Array, arc_lengths, world_axis_across
 from data_synthetic.rod.replay import TrueFrame, TrueInsertion, replay
 
@@ -55,7 +55,7 @@ def from_anatomy(path: str | Path) -> NamedScene:
         return Setup(anatomy, tube, ENTRY_ARC_MM, depths, (0.0,) * frames, 0.5 * (low + high))
 
     return NamedScene(
-        name=path.name.split(".")[0].replace(" ", "-").replace("(", "").replace(")", "").lower(),
+        name=name_after(path).lower(),
         why=f"vessels of {path.name}: {tube.length_mm:.0f} mm of its widest way, {len(anatomy.tubes)} tubes near it",
         plan=plan,
         fov_mm=float(np.max(high - low)) + 2 * (MARGIN_MM + widest),

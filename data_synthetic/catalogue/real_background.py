@@ -1,5 +1,6 @@
 """A wire in the real voxels of a scan: in a vessel that the scan shows, or else in one that is painted into it."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,13 +13,15 @@ from data_synthetic.anatomy.tubes import Anatomy, Tube
 from data_synthetic.anatomy.vessel_in_scan import Mask, find_vessel, find_way
 from data_synthetic.catalogue.own_scenes import END_MM, steered
 from data_synthetic.catalogue.painted_vessel import paint_vessel
-from data_synthetic.catalogue.scene import NamedScene, Setup, spread
+from data_synthetic.catalogue.scene import NamedScene, Setup, name_after, spread
 from data_synthetic.geometry import ScanGrid, Volume
 from data_synthetic.rod.rod import Wall
 from data_synthetic.scanner import Greys, PsfScanner
 
 SMALLEST = 16
 """Voxels along an axis below which nothing can be found in a scan."""
+UNEVEN = 0.05
+"""Share of the distance of slices by which they may lie elsewhere than on a grid."""
 VESSEL_GREY = 1000.0
 """Grey values are stretched so that the vessel lies here: room for a brighter wire, and for noise below zero."""
 FIRST_MM, ENTRY_ARC_MM, CORRIDOR_MM = 10.0, 1.0, 4.0
@@ -44,7 +47,7 @@ def background_scene(path: str | Path, voxel_mm: float | None = None) -> NamedSc
         return _plan(grid, way, wall, frames)
 
     return NamedScene(
-        name=Path(path).name.split(".")[0],
+        name=name_after(Path(path)),
         why=f"a made-up wire{what} in the real voxels of {Path(path).name}",
         plan=plan,
         frames=12,
@@ -57,6 +60,8 @@ def background_scene(path: str | Path, voxel_mm: float | None = None) -> NamedSc
 def read_scan(path: Path, voxel_mm: float | None) -> tuple[Volume, ScanGrid]:
     """Grey values indexed x, y, z, and where they lie; ValueError for what is no volume of grey values."""
     series = sitk.ImageSeriesReader.GetGDCMSeriesFileNames(str(path)) if path.is_dir() else str(path)
+    if path.is_dir():
+        _equally_far_apart(path, series)
     try:
         image: Any = sitk.ReadImage(series)
     except RuntimeError:
@@ -74,6 +79,23 @@ def read_scan(path: Path, voxel_mm: float | None) -> tuple[Volume, ScanGrid]:
     if not np.all(np.isfinite(values)) or values.min() == values.max():
         raise ValueError(f"{path}: its grey values are NaN, infinite or all alike; allowed: a scan that shows a vessel")
     return values, ScanGrid(values.shape, spacing, np.array(image.GetOrigin()), direction)
+
+
+def _equally_far_apart(folder: Path, slices: Sequence[str]) -> None:
+    """ValueError where slices lie unevenly or aside: a plain stack of them would stretch or shear what they show."""
+    places, reader = [], sitk.ImageFileReader()
+    for name in slices:
+        reader.SetFileName(name)
+        reader.ReadImageInformation()
+        places.append(reader.GetOrigin())
+    steps = np.diff(np.array(places), axis=0)
+    if not len(steps):
+        return
+    normal = np.array(reader.GetDirection()).reshape(3, 3)[:, 2]
+    along = np.abs(steps @ normal)
+    aside = np.linalg.norm(steps - (steps @ normal)[:, None] * normal, axis=1)
+    if np.ptp(along) > UNEVEN * np.median(along) or np.max(aside) > UNEVEN * np.median(along):
+        raise ValueError(f"{folder}: its slices are not equally far apart, or lean; give it resampled, as one file")
 
 
 def _ground(values: Volume, grid: ScanGrid) -> tuple[Volume, Tube, Wall | None]:

@@ -1,7 +1,9 @@
 """A named situation, and what it is made of before anything is computed."""
 
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import KW_ONLY, dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,6 +17,11 @@ from data_synthetic.scanner.conebeam import ConeBeamScanner
 from data_synthetic.scanner.phantom import Wires
 
 Scanner = PsfScanner | ConeBeamScanner
+
+
+def name_after(path: Path) -> str:
+    """Name of a scene after a file, of characters that a case's id may have."""
+    return re.sub(r"[^A-Za-z0-9_-]+", "-", path.name.split(".")[0]).strip("-_")[:90] or "scan"
 
 
 @dataclass(frozen=True, eq=False)

@@ -50,5 +50,10 @@ def main(args: argparse.Namespace) -> int:
     say(f"written: {path}")
     for note in (*seen, *(f"assumed: {text}" for text in assumed)):
         say(note)
-    say(f"correct it, then: wireval check {shlex.quote(str(path))} && wireval run {shlex.quote(str(path))} -o OUT")
+    words = [
+        str(path),
+        *(w for c in args.config for w in ("-c", str(c))),
+        *(w for s in args.settings for w in ("--set", s)),
+    ]
+    say(f"correct it, then: wireval check {shlex.join(words)} && wireval run {shlex.join(words)} -o OUT")
     return 0

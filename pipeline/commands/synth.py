@@ -132,6 +132,7 @@ def _one(args: Namespace) -> int:
     from data_synthetic.write import earlier_files, in_the_way, write_study
 
     clock = perf_counter()
+    chat = (lambda _: None) if args.quiet else say
     numbers = {"frames": args.frames, "size": args.size, "voxel_mm": args.voxel_mm, "seed": args.seed}
     try:
         scene = _scene(args)
@@ -139,13 +140,13 @@ def _one(args: Namespace) -> int:
         problems = problems or in_the_way(args.out, args.format, args.frames or scene.frames)
         if problems:
             return complain(problems, "the command line")
+        if args.background is not None:
+            say(f"{scene.name}: {scene.why}")
+        chat("the true wire is computed: seconds to minutes")
         study = catalogue.build(scene, scanner=args.scanner, **numbers)
     except (ValueError, ImportError) as error:
         return complain([str(error)], "the command line")
-    if args.background is not None:
-        say(f"{study.name}: {scene.why}")
     quality = study.quality
-    chat = (lambda _: None) if args.quiet else say
     chat(
         f"truth: largest force residual {quality['largest_residual_N']:.1e} N; halving its resolution moves it by "
         f"{quality['halving_moves_mm']:.4f} mm"

@@ -97,6 +97,12 @@ def _loose(folder: Path) -> str:
     return f"; frames/ holds {slices} slices of {of}: one folder a series, as in frames/0, frames/1" * bool(count)
 
 
+def _items(folder: Path) -> str:
+    """A hint where an HDF5 file lies, whose items only a manifest names; empty without."""
+    found = next((p.name for p in sorted(folder.iterdir()) if p.suffix.lower() in (".h5", ".hdf5")), "")
+    return f'; {found}: name its items in a manifest, as frames = "{found}#/frames"' * bool(found)
+
+
 def looks_wire_free(path: Path) -> bool:
     """Whether a file is named as a scan without the wire: reference.mha, empty_phantom.nii.gz."""
     stem = path.name.lower().split(".")[0]
@@ -224,7 +230,8 @@ def infer_manifest(
     if not frames:
         allowed = f"files {', '.join(SUFFIXES)} or DICOM folders, here or in frames/"
         found = f"{reference.name} alone, a reference, and no frames" if reference else "no scans"
-        raise unusable(folder, f"found {found}; allowed: {allowed}{_loose(folder) or _deeper(folder)}")
+        hint = _loose(folder) or _items(folder) or _deeper(folder)
+        raise unusable(folder, f"found {found}; allowed: {allowed}{hint}")
     seen = (
         f"frames: {len(frames)} scans in natural order, {frames[0].name} to {frames[-1].name}",
         f"reference: {reference.name}" if reference else NO_REFERENCE,

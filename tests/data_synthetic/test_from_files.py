@@ -18,6 +18,7 @@ from data_synthetic.anatomy.iso_wall import iso_wall
 from data_synthetic.anatomy.tubes import Anatomy, ball
 from data_synthetic.anatomy.vessel_in_scan import find_vessel, find_way
 from data_synthetic.catalogue import background_scene, build, from_anatomy
+from data_synthetic.catalogue.scene import name_after
 from data_synthetic.geometry import ScanGrid, voxels_near
 from data_synthetic.scanner.coverage import lumen_coverage
 from data_synthetic.write import alone, earlier_files
@@ -204,6 +205,28 @@ def test_a_vessel_is_painted_into_a_scan_that_shows_none(tmp_path: Path) -> None
     index = np.rint(study.grid.to_index(study.truth[1].points_mm)).astype(int)
     assert np.all(study.reference[tuple(index.T)] > 250)  # tissue is at 0, the vessel at 1000
     assert index[:, 1].min() > 22  # not in what is bright
+
+
+def test_a_study_is_named_as_a_manifest_may_name_a_case() -> None:
+    """One painted into "High quality head", written in a minute, was refused by ``run``."""
+    assert name_after(Path("High quality head")) == "High-quality-head"
+    assert name_after(Path("Schädel (2).nii.gz")) == "Sch-del-2"
+    assert name_after(Path(".nrrd")) == "scan"
+
+
+def test_slices_that_are_not_equally_far_apart_are_no_background(tmp_path: Path) -> None:
+    """They were stacked as if they were: a sheared head."""
+    writer = sitk.ImageFileWriter()
+    for number, z_mm in enumerate((0.0, 1.0, 2.0, 4.5)):
+        image = sitk.Image(20, 20, sitk.sitkInt16)
+        place = ("0020|000e", "1.2.3"), ("0020|0032", f"0\\0\\{z_mm}"), ("0020|0037", "1\\0\\0\\0\\1\\0")
+        for key, value in (("0008|0060", "CT"), *place, ("0020|0013", str(number))):
+            image.SetMetaData(key, value)
+        writer.SetFileName(str(tmp_path / f"{number}.dcm"))
+        writer.KeepOriginalImageUIDOn()
+        writer.Execute(image)
+    with pytest.raises(ValueError, match="its slices are not equally far apart"):
+        background_scene(tmp_path)
 
 
 def test_a_scan_without_room_for_a_vessel_is_refused(tmp_path: Path) -> None:

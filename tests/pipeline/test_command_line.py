@@ -212,8 +212,10 @@ def test_without_a_reference_init_says_what_to_correct_and_how(
     next(scans.glob("reference.*")).unlink()
     assert main(["run", str(scans), "-o", str(tmp_path / "out"), "--until", "trace", "-q"]) == 1
     assert f"next: wireval init '{scans}', correct in it what is assumed" in capsys.readouterr().err
-    assert main(["init", str(scans)]) == 0
-    assert "lumen_seed_mm: the entry, from where the vessel is segmented" in capsys.readouterr().out
+    assert main(["init", str(scans), "--set", "load.most_gib=4"]) == 0
+    said = capsys.readouterr().out
+    assert "lumen_seed_mm: the entry, from where the vessel is segmented" in said
+    assert said.count("/manifest.toml' --set load.most_gib=4") == 2, "what scans are read with is asked of them again"
     manifest = scans / "manifest.toml"
     text = manifest.read_text(encoding="utf-8")
     assert "change the signs of the first two numbers" in text
@@ -278,6 +280,9 @@ def test_a_stray_scan_and_one_that_stands_alone_are_named(scans: Path, capsys: p
     shutil.rmtree(scans / "frames")
     assert main(["init", str(scans)]) == 2
     assert "found reference.mha alone, a reference, and no frames" in capsys.readouterr().err
+    (scans / "study.h5").touch()
+    assert main(["init", str(scans)]) == 2
+    assert 'study.h5: name its items in a manifest, as frames = "study.h5#/frames"' in capsys.readouterr().err
 
 
 def test_settings_are_a_file_that_reads_back_as_the_defaults(

@@ -61,6 +61,14 @@ def test_a_rod_is_no_wire_of_a_third_of_its_radius(seed: int) -> None:
     assert "mm thick; expected 0.90 mm at most of a wire of radius_mm = 0.18" in refused.note
 
 
+def test_a_wall_that_looks_sharper_than_any_line_makes_no_rod_of_a_wire() -> None:
+    """A head's scan with a background of 0, blur of its wall 0.25 mm: all 12 right traces of a wire were refused."""
+    vessel = lumen(0.25, (0.5, 0.5, 0.5))
+    wire, rod = (Curve(np.eye(3), np.full(3, 0.02), levels={"blur_mm": blur_mm}) for blur_mm in (0.443, 0.55))
+    assert not_too_thick(wire, vessel, 0.18) is wire
+    assert not_too_thick(rod, vessel, 0.18) is not rod
+
+
 @pytest.mark.parametrize("vessel", [lumen(float("nan")), lumen(spacing_mm=(0.3, 0.3, 0.6))])
 def test_what_shows_no_width_is_no_rod(vessel: Lumen) -> None:
     thick = frames(0.55)[0].curve

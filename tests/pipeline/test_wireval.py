@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -69,6 +70,8 @@ def test_a_run_gives_frames(study: Path, tmp_path: Path) -> None:
     assert "<p>gate closed: --fail-if rms_mm&gt;0: rms_mm is 1</p><p>damaged" in closed._repr_html_()
     assert len(repr(results).splitlines()) < 13
     assert len(repr(results)) < 1000
+    assert re.fullmatch(r"\{'straight': CaseFiles\('.*/straight', ok, 2 frames\)\}", repr(results.cases))
+    assert re.match(r"FrameArrays\(frame 1, traced_mm \(\d+, 3\), ", repr(results.cases["straight"].read_frame(1)))
     assert wireval.read_results(tmp_path / "out").errors.equals(results.errors)
     table = tmp_path / "out" / "cases" / "straight" / "errors.csv"
     table.write_text(table.read_text(encoding="utf-8").replace("0.1", "0.01"), encoding="utf-8")

@@ -21,6 +21,9 @@ MOST_SHARE, MORE_VOXELS = 2.5, 0.75
 """The same ratio from which, and voxels by which, a line is thicker than any wire of the stated radius looks. The most
 of right traces in the scenes of ``tests.studies.seeing`` is 1.9 and 0.6; rods of 1 to 1.2 mm, of 0.36 stated, have 3 to
 4 and 1.4 to 2 in voxels of 0.3 mm."""
+SHARPEST_VOXELS = 0.8
+"""No line is taken to be blurred less: where what surrounds the vessel was set to one grey (a rotational X-ray scan of
+a head), its wall looks sharper (0.5) than a wire does, and each right trace there was refused."""
 
 
 def too_thin(frames: Sequence[Frame], lumen: Lumen, radius_mm: float) -> list[str]:
@@ -40,7 +43,7 @@ def too_thin(frames: Sequence[Frame], lumen: Lumen, radius_mm: float) -> list[st
 
 def not_too_thick(curve: Curve, lumen: Lumen, radius_mm: float) -> Curve:
     """The curve; ambiguous where its line is too thick for a wire of this radius: a rod, a catheter, another wire."""
-    seen = _seen_radius_mm(curve.levels.get("blur_mm", float("nan")), lumen)
+    seen = _seen_radius_mm(curve.levels.get("blur_mm", float("nan")), lumen, SHARPEST_VOXELS)
     most = max(MOST_SHARE * radius_mm, radius_mm + MORE_VOXELS * float(np.min(lumen.distance.spacing_mm)))
     if curve.status is not FrameStatus.OK or not seen > most or LEVEL in curve.levels:  # what is cut off looks wide
         return curve
@@ -52,14 +55,14 @@ def not_too_thick(curve: Curve, lumen: Lumen, radius_mm: float) -> Curve:
     return replace(curve, status=FrameStatus.TRACE_AMBIGUOUS, note=note)
 
 
-def _seen_radius_mm(blur_mm: float, lumen: Lumen) -> float:
+def _seen_radius_mm(blur_mm: float, lumen: Lumen, least_voxels: float = 0.0) -> float:
     """Radius that a line of this blur looks to have: a disc of radius r adds r^2 / 4 to the variance of the blur.
 
-    NaN where the scanner's own, that of the lumen's wall, is unknown, and in slices that are thicker than pixels, which
-    have a blur of their own (a ratio of 0 was seen).
+    least_voxels : of the scanner's own, that of the lumen's wall. NaN where this is unknown, and in slices that are
+    thicker than pixels, which have a blur of their own (a ratio of 0 was seen).
     """
     spacing_mm: NDArray[np.float64] = np.asarray(lumen.distance.spacing_mm)
     if not spacing_mm.max() < 1.2 * spacing_mm.min():
         return float("nan")
-    scanner = lumen.levels.get("scanner_blur_mm", float("nan"))
+    scanner = np.maximum(lumen.levels.get("scanner_blur_mm", np.nan), least_voxels * spacing_mm.min())
     return 2.0 * float(np.sqrt(np.maximum(0.0, blur_mm**2 - scanner**2)))
