@@ -2,6 +2,7 @@
 
 import argparse
 import shlex
+from itertools import chain
 from pathlib import Path
 
 from pipeline.commands import add_settings, resolved_settings, say, unwritable
@@ -50,10 +51,7 @@ def main(args: argparse.Namespace) -> int:
     say(f"written: {path}")
     for note in (*seen, *(f"assumed: {text}" for text in assumed)):
         say(note)
-    words = [
-        str(path),
-        *(w for c in args.config for w in ("-c", str(c))),
-        *(w for s in args.settings for w in ("--set", s)),
-    ]
-    say(f"correct it, then: wireval check {shlex.join(words)} && wireval run {shlex.join(words)} -o OUT")
+    options = [*(("-c", str(file)) for file in args.config), *(("--set", one) for one in args.settings)]
+    words = shlex.join([str(path), *chain.from_iterable(options)])
+    say(f"correct it, then: wireval check {words} && wireval run {words} -o OUT")
     return 0

@@ -22,10 +22,10 @@ def stated_in(path: Path, kind: str) -> tuple[str, str]:
         head = file.read(HEAD).decode("latin-1")
     # 3D Slicer's files: LPS and mm unless they say otherwise; in VTK's it writes the space
     slicer, vtk = kind == ".mrk.json", space_of(head.encode("latin-1"))
+    # "space = ras" in a title is not written by Slicer, and says nothing of the unit
+    default = "mm" * (slicer or (bool(vtk) and "SPACE" in head))
     unit = _UNIT.search(head)
-    return vtk or "LPS" * slicer, (unit[1] or unit[2]).lower() if unit else "mm" if slicer or (
-        vtk and "SPACE" in head
-    ) else ""
+    return vtk or "LPS" * slicer, (unit[1] or unit[2]).lower() if unit else default
 
 
 def _of_table(path: Path) -> tuple[str, str]:
