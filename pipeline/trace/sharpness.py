@@ -13,13 +13,14 @@ from pipeline.trace.subtraction import Subtraction
 
 WALL_BLURS, CLEAR_BLURS = 2.5, 3.5
 """How far from the wall, in the scanner's blurs, its profile is read, and how far from the wire, in the wire's."""
-THINNED, LEAST_PLACES = 5, 1000
-"""One voxel of so many is read, and how many there must be: 4000 give the differences to 4 % of the blur's square."""
+THINNED, LEAST_PLACES = 3, 1000
+"""One voxel of so many is read, and how many there must be: 7000 give the differences to 3 % of the blur's square."""
 CELL_MM, LEAST_IN_CELL = 6.0, 2.0
 """Cells in which the medium is as bright all over, and how much of a step one has to hold: contrast that decays along
 the vessel by 60 % passes for a blur otherwise, as the vessel turns."""
-UNUSUAL = 1.5
-"""Times the mean square that is left in most cells, from which on the wall there is no vessel's, but a bone's."""
+INNER_BLURS, EVEN = 1.5, 1.2
+"""From how far inside, in blurs, the medium of a cell may differ from its level by so many standard deviations of noise
+(rms): 0.9 to 1.05 in most, 1.2 where contrast decays, 1.4 to 2.8 where it has settled or a bone lies in the lumen."""
 
 
 def blur_by_axis(image: Subtraction, points: Array, sigma: float) -> Array:
@@ -39,16 +40,14 @@ def blur_by_axis(image: Subtraction, points: Array, sigma: float) -> Array:
     cells = (at * image.spacing // CELL_MM).astype(int).T
     cell = np.ravel_multi_index(tuple(cells), tuple(cells.max(axis=1) + 1))
     level, height = _step_in(cell, ndtr(-depth), grey)
-    known = height > 0.0
-    if np.count_nonzero(known) < LEAST_PLACES:
+    even = _even(cell, (grey - level - height * ndtr(-depth)) / image.noise, depth < -INNER_BLURS) & (height > 0.0)
+    if np.count_nonzero(even) < LEAST_PLACES:
         return np.zeros(3)
-    share, density = (grey - level)[known] / height[known], np.exp(-0.5 * depth**2) / np.sqrt(2.0 * np.pi)
+    cell, depth, rise, steep = cell[even], depth[even], rise[even], steep[even]
+    share, density = (grey - level)[even] / height[even], np.exp(-0.5 * depth**2) / np.sqrt(2.0 * np.pi)
     wider = (rise**2 / steep[:, None]) * (0.5 * depth * density / blur**2)[:, None]
-    design, cell = np.column_stack([wider, density])[known], cell[known]
-    left = np.column_stack([_beside_step(cell, ndtr(-depth[known]), column) for column in (*design.T, share)])
-    found = np.linalg.lstsq(left[:, :-1], left[:, -1], rcond=None)[0]
-    even = _usual(cell, (left[:, -1] - left[:, :-1] @ found) * height[known])
-    found = np.linalg.lstsq(left[even, :-1], left[even, -1], rcond=None)[0][:3]
+    left = [_beside_step(cell, ndtr(-depth), column) for column in (*wider.T, density, share)]
+    found = np.linalg.lstsq(np.column_stack(left[:-1]), left[-1], rcond=None)[0][:3]
     return np.asarray(found - found.mean())
 
 
@@ -61,10 +60,10 @@ def _beside_wall(image: Subtraction, points: Array, sigma: float) -> NDArray[np.
     return np.asarray(at[cKDTree(points).query(at * image.spacing)[0] > CLEAR_BLURS * sigma])
 
 
-def _usual(cell: NDArray[np.int64], rest: Array) -> NDArray[np.bool_]:
-    """Which places lie in cells that leave no more of the grey unexplained, ``rest`` (n,), than most cells do."""
-    square = np.bincount(cell, rest**2) / np.maximum(np.bincount(cell), 1)
-    return np.asarray(square[cell] < UNUSUAL * np.median(square[cell]))
+def _even(cell: NDArray[np.int64], rest: Array, inner: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Which places lie in cells of one grey inside. rest : (n,), over the noise, what a step leaves of the grey."""
+    square = np.bincount(cell, inner * rest**2) / np.maximum(np.bincount(cell, inner), 1)
+    return np.asarray(square[cell] < EVEN**2)
 
 
 def _step_in(cell: NDArray[np.int64], step: Array, values: Array) -> tuple[Array, Array]:
