@@ -74,10 +74,15 @@ def _ring(points: Array, radius: float) -> Array:
     return points + radius * (np.cos(PHI)[:, None, None] * u + np.sin(PHI)[:, None, None] * v)
 
 
-def read_around(image: Subtraction, points: Array, sigma: float) -> tuple[Array, Array]:
-    """Grey on a ring of RING_BLURS blurs about each point of a curve (n, 3), and on its axis: (ANGLES, n) and (n,)."""
-    ring = image.along(_ring(points, RING_BLURS * sigma).reshape(-1, 3))
-    return ring.reshape(ANGLES, len(points)), image.along(points)
+def places_around(points: Array, sigma: float) -> Array:
+    """Places (ANGLES + 1, n, 3) on a ring of RING_BLURS blurs about each point of a curve (n, 3), and the points."""
+    return np.concatenate([_ring(points, RING_BLURS * sigma), points[None]])
+
+
+def read_around(image: Subtraction, places: Array) -> tuple[Array, Array]:
+    """Grey at ``places_around`` a curve of n points: on the rings (ANGLES, n), and on the axis (n,)."""
+    grey = image.along(places.reshape(-1, 3)).reshape(len(places), -1)
+    return grey[:-1], grey[-1]
 
 
 def second_harmonic(ring: Array) -> NDArray[np.complex128]:
