@@ -113,9 +113,12 @@ class Section:
     def turned(self, twist: float) -> Array:
         """The same of a section that turns by so many turns per mm."""
         back = np.exp(-4j * np.pi * twist * self.step_mm * np.arange(len(self.grey)))
-        least = max(0.3 * float(np.median(self.grey)), 1e-9)
         mean = np.convolve(self.harmonic * back, self.window, "same")
-        return np.asarray(np.abs(mean) / np.maximum(self.grey, least), float)
+        return np.asarray(np.abs(mean) / self._height, float)
+
+    @cached_property
+    def _height(self) -> Array:
+        return np.maximum(self.grey, max(0.3 * float(np.median(self.grey)), 1e-9))
 
 
 def section_along(image: Subtraction, points: Array, read: tuple[Array, Array]) -> Section:

@@ -58,7 +58,7 @@ class Tube:
     start_plane: tuple[Array, Array] | None = None
     steps: Steps = EVEN
 
-    @property
+    @cached_property
     def peak(self) -> float:
         """Median grey above the background along the wire."""
         u = np.linspace(0.0, 1.0, 20 * len(self.tint))
@@ -74,7 +74,7 @@ class Tube:
         """Length of the curve."""
         return float(arc_length(self.at(np.linspace(0, self.intervals, 4 * self.intervals + 1)))[-1])
 
-    @property
+    @cached_property
     def knot_mm(self) -> float:
         """Mean distance of neighbouring control points."""
         return float(np.mean(np.linalg.norm(np.diff(self.controls, axis=0), axis=1)))
