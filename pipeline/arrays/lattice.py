@@ -17,8 +17,8 @@ from solver._compile import on_disk
 HOW: dict[str, Any] = {"no_cfunc_wrapper": True}
 entry_point = on_disk(nogil=True, **HOW)
 """Compiles what Python calls: kept on disk until a source behind it changes; others may run beside it (``cores``)."""
-kernel = njit(forceinline=True, **HOW)
-"""Compiles what other kernels call: into the entry points, all of it, as a call in an inner loop costs a tenth."""
+kernel = njit(**HOW)
+"""Compiles what other kernels call: into the entry points."""
 
 
 @kernel

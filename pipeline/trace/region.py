@@ -59,11 +59,11 @@ class SearchRegion:
     @cached_property
     def sample_depth(self) -> NDArray[np.float32]:
         """Signed distance (n,) of ``sample`` to the wall."""
-        return self.box.values[tuple(self.sample.T)]
+        return np.asarray(self.box.values[tuple(self.sample.T)])
 
     @cached_property
     def _sample_in_frame(self) -> NDArray[np.int64]:
-        return np.ravel_multi_index(tuple((self.sample + self.corner).T), self.frame)
+        return np.asarray(np.ravel_multi_index(tuple((self.sample + self.corner).T), self.frame))
 
     def sampled(self, scan: Grid) -> NDArray[Any]:
         """A frame's own grey (n,) at ``sample``."""
@@ -72,7 +72,7 @@ class SearchRegion:
     @cached_property
     def sample_flat(self) -> NDArray[np.int64]:
         """Flat indices (n,) of ``sample`` in the box."""
-        return np.ravel_multi_index(tuple(self.sample.T), self.box.shape)
+        return np.asarray(np.ravel_multi_index(tuple(self.sample.T), self.box.shape))
 
     @cached_property
     def _deeper(self) -> dict[float, NDArray[np.int64]]:
