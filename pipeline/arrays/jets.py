@@ -153,19 +153,24 @@ def gaussian_taps(sigma_voxel: float) -> NDArray[np.float32]:
 @kernel
 def smoothed(volume: NDArray[Any], taps: NDArray[Any], i: int, j: int, k: int) -> float:
     """The separable kernel ``taps`` (2r+1) applied at one voxel; the border voxel is repeated outside."""
-    reach = taps.shape[0] // 2
+    size, reach = taps.shape[0], taps.shape[0] // 2
     ni, nj, nk = volume.shape
+    inside = k >= reach and k + reach < nk
     total = 0.0
-    for a in range(-reach, reach + 1):
-        ia = clamped(i + a, ni)
+    for a in range(size):
+        ia = clamped(i + a - reach, ni)
         plane = 0.0
-        for b in range(-reach, reach + 1):
-            jb = clamped(j + b, nj)
+        for b in range(size):
+            jb = clamped(j + b - reach, nj)
             row = 0.0
-            for c in range(-reach, reach + 1):
-                row += taps[c + reach] * volume[ia, jb, clamped(k + c, nk)]
-            plane += taps[b + reach] * row
-        total += taps[a + reach] * plane
+            if inside:  # 0.6 of the time, with an index that cannot be negative
+                for c in range(size):
+                    row += taps[c] * volume[ia, jb, np.uint64(k - reach + c)]
+            else:
+                for c in range(size):
+                    row += taps[c] * volume[ia, jb, clamped(k - reach + c, nk)]
+            plane += taps[b] * row
+        total += taps[a] * plane
     return total
 
 

@@ -72,11 +72,17 @@ def tangents(curve_mm: ArrayLike, arc_mm: Array, reach_mm: float) -> Array:
     return np.asarray(chords / np.maximum(np.linalg.norm(chords, axis=1), 1e-12)[:, None])
 
 
+def crossed(a: Array, b: Array) -> Array:
+    """Cross products (..., 3), as ``np.cross`` has them, in a quarter of its time where there are few."""
+    (a0, a1, a2), (b0, b1, b2) = a.T, b.T
+    return np.array([a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0]).T
+
+
 def across(directions: Array) -> Array:
     """Two vectors (..., 2, 3) across directions (..., 3) and each other, the first of length 1, the second as long."""
-    first = np.cross(directions, np.eye(3)[np.argmin(np.abs(directions), axis=-1)])
+    first = crossed(directions, np.eye(3)[np.argmin(np.abs(directions), axis=-1)])
     first /= np.maximum(np.linalg.norm(first, axis=-1, keepdims=True), 1e-12)
-    return np.stack([first, np.cross(directions, first)], axis=-2)
+    return np.stack([first, crossed(directions, first)], axis=-2)
 
 
 def turns_deg(curve_mm: Array, apart: int) -> Array:

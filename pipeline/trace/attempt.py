@@ -108,12 +108,7 @@ def _fitted(
 
 def dense(tube: Tube, step: float) -> Array:
     """Points of the tube's curve about ``step`` mm apart."""
-    return tube.at(np.linspace(0, tube.intervals, max(3, round(tube_length(tube) / step) + 1)))
-
-
-def tube_length(tube: Tube) -> float:
-    """Length of the tube's curve, mm."""
-    return float(arc_length(tube.at(np.linspace(0, tube.intervals, 4 * tube.intervals + 1)))[-1])
+    return tube.at(np.linspace(0, tube.intervals, max(3, round(tube.length_mm / step) + 1)))
 
 
 def _off(image: Subtraction, tube: Tube, pieces: list[Tracklet], known: Array) -> list[tuple[Array, float]]:
@@ -158,9 +153,9 @@ def prolonged(image: Subtraction, attempt: Attempt, entry: EntryPose) -> Attempt
     if path is None:
         # a dim end is looked for straight ahead; once more from where it was found, as wires bend
         found = again(image, attempt, entry) if len(attempt.tube.steps.edges) else attempt
-        return found if tube_length(found.tube) > tube_length(attempt.tube) + image.voxel else None
+        return found if found.tube.length_mm > attempt.tube.length_mm + image.voxel else None
     tube = _fitted(image, path.points, attempt.cut, entry)
-    if tube is None or tube_length(tube) < tube_length(attempt.tube) + 3.0 * image.voxel:
+    if tube is None or tube.length_mm < attempt.tube.length_mm + 3.0 * image.voxel:
         return replace(attempt, goes_on=True)
     gaps = attempt.path.points[attempt.path.bridged]
     points = np.concatenate([gaps, path.points])

@@ -10,7 +10,6 @@ from pipeline.arrays.grids import spread
 from pipeline.arrays.jets import Blurred, gaussian_taps, smooth_voxels
 from pipeline.arrays.lattice import sparse_zeros
 from pipeline.model import Array, arc_length
-from pipeline.trace._kernels.runs import above
 from pipeline.trace._kernels.tracklets import Ground, Rules, tracklets
 from pipeline.trace.subtraction import Subtraction
 
@@ -58,8 +57,9 @@ def find_crests(
 ) -> list[Tracklet]:
     """All tracklets in the region, strongest first; ``sigma_voxel`` is the blur in which crests are looked for."""
     taps, sigma = gaussian_taps(sigma_voxel), sigma_voxel * image.voxel
-    noise = spread(smooth_voxels(image.grey, taps, image.region.within[::4]))
-    bright = above(image.grey, image.region.allowed, image.region.runs, PREFILTER * image.noise)
+    noise = spread(image.sampled_in(sigma_voxel))
+    places = image.region.axis
+    bright = places[image.grey.reshape(-1)[places] > PREFILTER * image.noise]
     image.counters["voxels_visited"] = image.counters.get("voxels_visited", 0.0) + bright.size
     smooth = smooth_voxels(image.grey, taps, bright)
     strong = np.flatnonzero(smooth > seed_sigmas * noise)

@@ -14,7 +14,6 @@ from scipy.special import ndtri
 from pipeline.arrays.grids import spread
 from pipeline.model import Array
 from pipeline.trace.region import SearchRegion, voxels_of
-from solver.grid import Grid
 
 LEAST_LEVEL = 200
 """Fewest voxels from which a level is estimated."""
@@ -53,32 +52,31 @@ def _difference(rest: Array, full: Array, deep: NDArray[np.bool_], out: NDArray[
 
 
 def matched(
-    grey: NDArray[np.float32], background: NDArray[Any], region: SearchRegion, frame: Grid, still: NDArray[Any]
+    grey: NDArray[np.float32], background: NDArray[Any], region: SearchRegion, seen: NDArray[Any], still: NDArray[Any]
 ) -> float:
     """The frame's contrast over the reference's; ``grey``, frame minus background, is corrected where that is not 1, or
     where the frame's grey lies off.
 
-    still : the reference's own grey at ``region.sample``.
+    seen, still : the frame's and the reference's own grey at ``region.sample``.
     """
-    at = tuple(region.sample.T)
-    distance, voxel = region.box.values[at], float(np.min(region.box.spacing_mm))
+    at, distance, voxel = region.sample_flat, region.sample_depth, float(np.min(region.box.spacing_mm))
     deep, out = distance < -voxel, distance > 2 * voxel
     if min(np.count_nonzero(deep), np.count_nonzero(out)) < LEAST_LEVEL:
         return 1.0
-    low, offset = float(np.median(background[at][out])), float(np.median(grey[at][out]))
-    seen = frame.values[tuple((region.sample + region.corner).T)].astype(float)
-    rest = seen - still
+    medium = background.reshape(-1)[at]
+    low, offset = float(np.median(medium[out])), float(np.median(grey.reshape(-1)[at[out]]))
+    rest = seen.astype(float) - still
     noise = spread(rest[out])
     if np.mean(seen[out] == seen.min()) > CUT_OFF:
         # cut off, noise is half as large there, and its median is not its mean, which the smoothed reference shows
         noise, offset = _darker(rest[deep]), float(np.median(rest[out]))
-    more = _difference(rest, background[at] - low, deep, out, noise)
+    more = _difference(rest, medium - low, deep, out, noise)
     sure = max(SAME_OFFSET, SURE_OFFSET / float(np.sqrt(np.count_nonzero(out))))
     apart = abs(offset) > sure * noise
     if more != 0.0 or apart:
         everywhere = tuple(voxels_of(region.runs).T)
-        medium = np.float32(more) * (background[everywhere] - np.float32(low))
-        grey[everywhere] -= np.float32(offset) + medium.astype(np.float32)
+        further = np.float32(more) * (background[everywhere] - np.float32(low))
+        grey[everywhere] -= np.float32(offset) + further.astype(np.float32)
     return 1.0 + more
 
 

@@ -67,11 +67,11 @@ def _places(image: Subtraction, curve: Array) -> NDArray[np.int64]:
     index = unflattened(image.region.within[::7], box.shape)
     inner = np.all((index >= HALF) & (index < np.array(box.shape) - HALF), axis=1)
     index = index[inner]
+    index = index[box.values[tuple(index.T)] < 0]
     if len(index) and len(curve):
         most = BESIDE_VOXELS * image.voxel
         far = cKDTree(curve).query(index * image.spacing, distance_upper_bound=most)[0]
         index = index[(far > CLEAR_VOXELS * image.voxel) & np.isfinite(far)]
-    index = index[box.values[tuple(index.T)] < 0]
     return np.asarray(index[:: max(1, len(index) // PLACES)])
 
 

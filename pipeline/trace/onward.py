@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import cKDTree
 
+from pipeline.arrays.grids import unflattened
 from pipeline.arrays.polyline import tip_tangent
 from pipeline.model import Array
 from pipeline.trace.crests import Tracklet, find_crests
@@ -57,13 +58,12 @@ TANGENT_MM = 1.5
 
 
 def _near(region: SearchRegion, corner: Array, high: Array) -> SearchRegion:
-    """The region's rows within a box (indices), its ends shortened to it."""
-    runs = region.runs
-    keep = np.all((runs[:, :2] >= corner[:2]) & (runs[:, :2] <= high[:2]), axis=1)
-    rows = runs[keep].copy()
-    rows[:, 2] = np.maximum(rows[:, 2], corner[2])
-    rows[:, 3] = np.minimum(rows[:, 3], high[2] + 1)
-    return replace(region, runs=np.ascontiguousarray(rows[rows[:, 3] > rows[:, 2]]))
+    """The region with the axis's voxels within a box (indices) alone."""
+    layer = int(np.prod(region.box.shape[1:]))
+    first, stop = np.searchsorted(region.axis, (corner[0] * layer, (high[0] + 1) * layer))
+    flat = region.axis[first:stop]
+    index = unflattened(flat, region.box.shape)
+    return replace(region, axis=flat[np.all((index >= corner) & (index <= high), axis=1)])
 
 
 def _stands_out(piece: Tracklet, noise: float, voxel: float) -> bool:
@@ -136,7 +136,7 @@ def _from_crests(image: Subtraction, line: Array, known: Array, faintest: float)
     tip, heading = line[-1], tip_tangent(line, TANGENT_MM)
     reach, at = np.ceil(REACH_MM / image.spacing), np.rint(tip / image.spacing)
     near = _near(image.region, at - reach, at + reach)
-    if len(near.runs) == 0:
+    if len(near.axis) == 0:
         return None, False
     noise, tree = image.noise_in(WIDE_VOXELS), cKDTree(np.concatenate([line, known]))
     runs, stray = [], False

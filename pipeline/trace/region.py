@@ -40,19 +40,49 @@ class SearchRegion:
 
     box : float32 signed distance on the frames' lattice.  corner : index in the frame of its voxel (0, 0, 0).
     runs : (n, 4) rows of voxels near the lumen: i, j, first k, stop k.  allowed : uint8 box, 1 where the wire's axis
-    may lie.  within : flat indices of a sample of those.
+    may lie.  axis : flat indices of those, ascending.  within : of a sample of them.  frame : shape of the frames.
     """
 
     box: Grid
     corner: NDArray[np.int64]
     runs: NDArray[np.int64]
+    axis: NDArray[np.int64]
     within: NDArray[np.int64]
     allowed: NDArray[np.uint8]
+    frame: tuple[int, ...]
 
     @cached_property
     def sample(self) -> NDArray[np.int64]:
         """Voxels (n, 3) of 2000 runs or so: enough for a median."""
         return voxels_of(self.sampled_runs)
+
+    @cached_property
+    def sample_depth(self) -> NDArray[np.float32]:
+        """Signed distance (n,) of ``sample`` to the wall."""
+        return np.asarray(self.box.values[tuple(self.sample.T)])
+
+    @cached_property
+    def _sample_in_frame(self) -> NDArray[np.int64]:
+        return np.asarray(np.ravel_multi_index(tuple((self.sample + self.corner).T), self.frame))
+
+    def sampled(self, scan: Grid) -> NDArray[Any]:
+        """A frame's own grey (n,) at ``sample``."""
+        return np.asarray(scan.values.reshape(-1)[self._sample_in_frame])
+
+    @cached_property
+    def sample_flat(self) -> NDArray[np.int64]:
+        """Flat indices (n,) of ``sample`` in the box."""
+        return np.asarray(np.ravel_multi_index(tuple(self.sample.T), self.box.shape))
+
+    @cached_property
+    def _deeper(self) -> dict[float, NDArray[np.int64]]:
+        return {}
+
+    def deeper(self, depth_mm: float) -> NDArray[np.int64]:
+        """The voxels (flat) of ``within`` that are more than so many mm inside the wall."""
+        if depth_mm not in self._deeper:
+            self._deeper[depth_mm] = self.within[self.box.values.reshape(-1)[self.within] < -depth_mm]
+        return self._deeper[depth_mm]
 
     @property
     def sampled_runs(self) -> NDArray[np.int64]:
@@ -107,9 +137,9 @@ def _region(frame: Grid, distance: Grid) -> SearchRegion:
     # in float64: a limit rounded up to float32 may include the distances that were cut off at it
     runs = runs_below(box.values, HALO_VOXELS * float(box.spacing_mm.min()))
     allowed = box.values < INSIDE_MM
-    within = np.flatnonzero(allowed)
-    within = within[:: max(1, len(within) // SAMPLE)]
-    return SearchRegion(box, corner, runs, within, allowed.view(np.uint8))
+    axis = np.flatnonzero(allowed)
+    within = axis[:: max(1, len(axis) // SAMPLE)]
+    return SearchRegion(box, corner, runs, axis, within, allowed.view(np.uint8), frame.shape)
 
 
 _regions: weakref.WeakKeyDictionary[Lumen, tuple[bytes, SearchRegion]] = weakref.WeakKeyDictionary()

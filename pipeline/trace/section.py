@@ -73,10 +73,15 @@ def _ring(points: Array, radius: float) -> Array:
     return points + radius * (np.cos(PHI)[:, None, None] * u + np.sin(PHI)[:, None, None] * v)
 
 
-def read_around(image: Subtraction, points: Array, sigma: float) -> tuple[Array, Array]:
-    """Grey on a ring of RING_BLURS blurs about each point of a curve (n, 3), and on its axis: (ANGLES, n) and (n,)."""
-    ring = image.along(_ring(points, RING_BLURS * sigma).reshape(-1, 3))
-    return ring.reshape(ANGLES, len(points)), image.along(points)
+def places_around(points: Array, sigma: float) -> Array:
+    """Places (ANGLES + 1, n, 3) on a ring of RING_BLURS blurs about each point of a curve (n, 3), and the points."""
+    return np.concatenate([_ring(points, RING_BLURS * sigma), points[None]])
+
+
+def read_around(image: Subtraction, places: Array) -> tuple[Array, Array]:
+    """Grey at ``places_around`` a curve of n points: on the rings (ANGLES, n), and on the axis (n,)."""
+    grey = image.along(places.reshape(-1, 3)).reshape(len(places), -1)
+    return grey[:-1], grey[-1]
 
 
 def second_harmonic(ring: Array) -> NDArray[np.complex128]:
@@ -107,9 +112,12 @@ class Section:
     def turned(self, twist: float) -> Array:
         """The same of a section that turns by so many turns per mm."""
         back = np.exp(-4j * np.pi * twist * self.step_mm * np.arange(len(self.grey)))
-        least = max(0.3 * float(np.median(self.grey)), 1e-9)
         mean = np.convolve(self.harmonic * back, self.window, "same")
-        return np.asarray(np.abs(mean) / np.maximum(self.grey, least), float)
+        return np.asarray(np.abs(mean) / self._height, float)
+
+    @cached_property
+    def _height(self) -> Array:
+        return np.maximum(self.grey, max(0.3 * float(np.median(self.grey)), 1e-9))
 
 
 def section_along(image: Subtraction, points: Array, read: tuple[Array, Array], sigma: float) -> Section:

@@ -66,6 +66,7 @@ class Subtraction:
     counters: dict[str, float] = field(default_factory=dict)
     levels: dict[str, float] = field(default_factory=dict)
     noises: dict[float, float] = field(default_factory=dict)
+    samples: dict[float, NDArray[np.float32]] = field(default_factory=dict)
 
     @cached_property
     def spacing(self) -> Array:
@@ -96,8 +97,7 @@ class Subtraction:
     @cached_property
     def wall_greys(self) -> tuple[float, float]:
         """Median grey of the frame well inside the lumen and just outside it."""
-        at = self.region.sample
-        grey, distance = self.scan.values[tuple((at + self.region.corner).T)], self.region.box.values[tuple(at.T)]
+        grey, distance = self.region.sampled(self.scan), self.region.sample_depth
         h = float(np.min(self.region.box.spacing_mm))
         deep, out = distance < -h, distance > 2 * h
         inside = float(np.median(grey[deep if deep.any() else distance < h]))
@@ -112,9 +112,15 @@ class Subtraction:
     def noise_in(self, blur_voxels: float) -> float:
         """Standard deviation of the noise in grey blurred by so many voxels, measured: correlation counts."""
         if blur_voxels not in self.noises:
-            sample = smooth_voxels(self.grey, gaussian_taps(blur_voxels), self.region.within[::8])
-            self.noises[blur_voxels] = max(spread(sample), 1e-6)
+            self.noises[blur_voxels] = max(spread(self.sampled_in(blur_voxels)[::2]), 1e-6)
         return self.noises[blur_voxels]
+
+    def sampled_in(self, blur_voxels: float) -> NDArray[np.float32]:
+        """Grey blurred by so many voxels, as it is now, at a sample of places: enough for its noise."""
+        if blur_voxels not in self.samples:
+            places = self.region.within[::4]
+            self.samples[blur_voxels] = smooth_voxels(self.grey, gaussian_taps(blur_voxels), places)
+        return self.samples[blur_voxels]
 
     @property
     def correlation(self) -> float:
@@ -160,25 +166,22 @@ class Subtraction:
         flat = self.grey.reshape(-1)
         kept = flat[voxels]
         flat[voxels] = grey
+        self.samples.clear()
         try:
             yield
         finally:
             flat[voxels] = kept
+            self.samples.clear()
 
     def deep(self, voxels: float) -> NDArray[np.int64]:
         """The lumen's voxels (flat) that are more than so many voxels inside its wall."""
-        within = self.region.within
-        return np.asarray(within[self.region.box.values.reshape(-1)[within] < -voxels * self.voxel])
+        return self.region.deeper(voxels * self.voxel)
 
     def depth_at(self, points: Array) -> NDArray[Any]:
         """Signed distance to the wall (n,) at the voxels nearest to points (n, 3); beyond the box, that at its edge."""
         box = self.region.box
         index = np.clip(np.rint(points / self.spacing).astype(int), 0, np.array(box.shape) - 1)
         return np.asarray(box.values[tuple(index.T)])
-
-
-def _sampled(grid: Grid, region: SearchRegion) -> NDArray[Any]:
-    return np.asarray(grid.values[tuple((region.sample + region.corner).T)])
 
 
 def subtracted(frame: Volume, lumen: Lumen, reference: Volume | None) -> Subtraction:
@@ -188,13 +191,14 @@ def subtracted(frame: Volume, lumen: Lumen, reference: Volume | None) -> Subtrac
     background, still = background_of(grid, reference, region, lumen, axes)
     grey = region.greys.take()
     subtract(grid.values, background, region.corner, region.runs, grey)
-    gain = 1.0 if still is None else matched(grey, background, region, grid, still)
+    seen = region.sampled(grid)
+    gain = 1.0 if still is None else matched(grey, background, region, seen, still)
     noise = spread(grey.reshape(-1)[region.within])
     total, read = float(np.prod(grid.shape)), float(np.sum(region.runs[:, 3] - region.runs[:, 2]))
     counters = {"voxels_total": total, "voxels_read": read, "voxels_skipped": total - read}
     blur = wall_blur(lumen, float(np.min(region.box.spacing_mm)))
     modelled, levels = reference is None or gain != 1.0, {"noise": noise, "gain": gain}
-    if still is not None and (copied := copied_share(_sampled(grid, region), still, region.sampled_runs)):
+    if still is not None and (copied := copied_share(seen, still, region.sampled_runs)):
         levels["copied"] = copied
     uneven = modelled and lumen.levels.get("least_filling", 1.0) < UNEVEN
     return Subtraction(region, grey, max(noise, 1e-6), modelled, blur, grid, uneven, counters, levels)
@@ -255,4 +259,5 @@ def levelled(image: Subtraction, curve: Array, sigma: float) -> Subtraction:
     rest = grey - share * level
     out[at] = rest
     noise = spread(rest[clear]) if np.count_nonzero(clear) > 100 else image.noise
-    return replace(image, grey=out, noise=max(noise, 1e-6), levels=image.levels | {"noise": noise}, noises={})
+    levels = image.levels | {"noise": noise}
+    return replace(image, grey=out, noise=max(noise, 1e-6), levels=levels, noises={}, samples={})

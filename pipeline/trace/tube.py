@@ -1,6 +1,7 @@
 """The wire fitted as a whole: a B-spline line source blurred by a Gaussian, against the raw voxels around it."""
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,7 +58,7 @@ class Tube:
     start_plane: tuple[Array, Array] | None = None
     steps: Steps = EVEN
 
-    @property
+    @cached_property
     def peak(self) -> float:
         """Median grey above the background along the wire."""
         u = np.linspace(0.0, 1.0, 20 * len(self.tint))
@@ -68,7 +69,12 @@ class Tube:
         """Number of spline pieces."""
         return len(self.controls) - 3
 
-    @property
+    @cached_property
+    def length_mm(self) -> float:
+        """Length of the curve."""
+        return float(arc_length(self.at(np.linspace(0, self.intervals, 4 * self.intervals + 1)))[-1])
+
+    @cached_property
     def knot_mm(self) -> float:
         """Mean distance of neighbouring control points."""
         return float(np.mean(np.linalg.norm(np.diff(self.controls, axis=0), axis=1)))
@@ -144,8 +150,7 @@ def spline_through(points: Array, knot: float) -> Array:
     np.put_along_axis(basis, i[:, None] + np.arange(4), value, axis=1)
     third = np.diff(np.eye(k), n=3, axis=0)
     factors = _factors(basis.T @ basis + 1e-3 * (len(u) / k) * third.T @ third)
-    right = basis.T @ points
-    return np.stack([substitute(*factors, np.ascontiguousarray(right[:, a])) for a in range(3)], axis=1)
+    return np.asarray(substitute(*factors, basis.T @ points))
 
 
 def _prior(tube: Tube, image: Subtraction) -> Array:
@@ -252,15 +257,14 @@ def fit_tube(image: Subtraction, tube: Tube, iterations: int = 12, tolerance: fl
         found, _, line = _equations(image, tube, samples, prior)
         normal, right = _damped(found.normal, tube, SLIDING), found.right
         _hold(normal, right, [-2] * (done <= BLUR_HELD) + stepped)
-        tube, size = _moved(tube, substitute(*_factors(normal), right), image.voxel, line)
+        tube, size = _moved(tube, substitute(*_factors(normal), right[:, None])[:, 0], image.voxel, line)
         if size < tolerance * image.voxel and done > BLUR_HELD:
             break
     found, claim, _ = _equations(image, tube, samples, prior)
     rms = float(np.sqrt(found.square / max(1.0, claim.weight.sum())))
     normal = _damped(found.normal, tube, POLISHED)
     _hold(normal, found.right, stepped)
-    factors = _factors(normal)
-    covariance = np.stack([substitute(*factors, unit) for unit in np.eye(len(found.normal))]) * image.noise**2
+    covariance = substitute(*_factors(normal), np.eye(len(normal))).T * image.noise**2
     return replace(
         tube, covariance=covariance, residual_rms=rms, iterations=done, voxels=claim.voxels, rest=found.residual
     )

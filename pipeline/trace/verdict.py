@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from pipeline.model import Array, arc_length
 from pipeline.status import FrameStatus
-from pipeline.trace.attempt import Attempt, tube_length
+from pipeline.trace.attempt import Attempt
 from pipeline.trace.ends import (
     TIP_BESIDE,
     Objection,
@@ -22,7 +22,15 @@ from pipeline.trace.ends import (
 )
 from pipeline.trace.link import extended, resampled
 from pipeline.trace.profile import LEAST_LEVEL, Steps
-from pipeline.trace.section import Section, paired, paired_in_part, read_around, second_harmonic, section_along
+from pipeline.trace.section import (
+    Section,
+    paired,
+    paired_in_part,
+    places_around,
+    read_around,
+    second_harmonic,
+    section_along,
+)
 from pipeline.trace.strands import BESIDE_VOXELS, DOUBLE, doubled, of_one_strand
 from pipeline.trace.subtraction import CREST_VOXELS, Subtraction
 from pipeline.trace.tube import Tube
@@ -87,7 +95,7 @@ def _averaged(values: Array, width: int) -> Array:
 def _shares(tube: Tube, points: Array) -> Array:
     """Shares (n,) of the tube's length at which points (n, 3) lie, the last at its end."""
     arc = arc_length(points)
-    return np.asarray(1.0 - (arc[-1] - arc) / max(tube_length(tube), arc[-1]))
+    return np.asarray(1.0 - (arc[-1] - arc) / max(tube.length_mm, arc[-1]))
 
 
 def _crest_share(image: Subtraction, attempt: Attempt, points: Array, step_mm: float) -> tuple[Array, Array]:
@@ -155,7 +163,8 @@ def judge(image: Subtraction, attempt: Attempt, points: Array, bridged: NDArray[
     ends = np.minimum(np.arange(len(points)), np.arange(len(points))[::-1]) * step
     known = seen_steps(attempt.tube.steps, _shares(attempt.tube, points))
     faint = (share < FAINT + noise) & (ends > MEAN_OVER_MM) & ~known
-    read = read_around(image, points, attempt.tube.sigma)
+    places = places_around(points, attempt.tube.sigma)
+    read = read_around(image, places)
     section = section_along(image, points, read, attempt.tube.sigma)
     double = beside_itself(points, step, BESIDE_VOXELS * image.voxel)
     if not image.thick_slices:
@@ -166,7 +175,7 @@ def judge(image: Subtraction, attempt: Attempt, points: Array, bridged: NDArray[
     objections = of_the_frame(image) + of_the_way(attempt, length_mm)
     objections += _of_the_line(image, attempt, points, (share, noise, outside), (faint_mm, double_mm, length_mm))
     folded = bool(beside_itself(points, step, TIP_BESIDE * image.voxel)[-1])
-    fitted = as_fitted(image, attempt.tube, points)
+    fitted = as_fitted(image, attempt.tube, places)
     pair = 0.0 if image.thick_slices else _pair(image, section, fitted, length_mm)
     objections += of_a_pair(pair, attempt)
     objections += of_the_ends(image, attempt, points, length_mm, folded=folded) + of_the_lumen(image, attempt, points)

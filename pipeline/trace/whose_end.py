@@ -14,7 +14,7 @@ from pipeline.arrays.grids import unflattened
 from pipeline.arrays.jets import gaussian_taps, smooth_voxels
 from pipeline.model import Array, Curve, arc_length
 from pipeline.status import FrameStatus
-from pipeline.trace.attempt import dense, tube_length
+from pipeline.trace.attempt import dense
 from pipeline.trace.profile import BAND_VOXELS, INDEPENDENT_VOXELS, LEAST_LEVEL, UNEVEN, Steps
 from pipeline.trace.subtraction import CREST_VOXELS, Subtraction
 from pipeline.trace.tube import Tube
@@ -66,10 +66,11 @@ def _marks_beyond(image: Subtraction, tube: Tube, line: Array) -> Array:
     flat = flat[image.grey.reshape(-1)[flat] > least]
     seen = smooth_voxels(image.grey, gaussian_taps(MARK_BLUR), flat)
     least *= tube.sigma**2 / (tube.sigma**2 + blur**2)
-    bright = flat[seen > max(least, MARK_SIGMAS * image.noise_in(MARK_BLUR))]
-    found = unflattened(bright, image.grey.shape) * image.spacing
-    if not len(found):
+    flat, seen = flat[seen > least], seen[seen > least]
+    bright = flat[seen > MARK_SIGMAS * image.noise_in(MARK_BLUR)] if len(flat) else flat
+    if not len(bright):
         return np.zeros((0, 3))
+    found = unflattened(bright, image.grey.shape) * image.spacing
     away, nearest = cKDTree(line).query(found)
     return np.asarray(found[(nearest == len(line) - 1) & (away > MARK_OFF * h)])
 
@@ -117,7 +118,7 @@ def of_one_device(image: Subtraction, tube: Tube, curve: Curve) -> Curve:
 
     Frames at other depths tell: a wire's own dim end stays as long, what a catheter shows beyond the wire does not.
     """
-    from_tip = dim_from_tip_mm(tube.steps, tube_length(tube), image.voxel)
+    from_tip = dim_from_tip_mm(tube.steps, tube.length_mm, image.voxel)
     if not from_tip or curve.status is not FrameStatus.OK:
         return curve
     got = f"a line whose last {from_tip:.1f} mm are far dimmer than what is before"

@@ -25,10 +25,10 @@ makes one so much rounder than the end. Folds of 2 to 6 mm, 1.6 to 2.1 voxels be
 body 0.02; noise alone is 2.5 times its upper quartile once in 6,000."""
 
 
-def as_fitted(image: Subtraction, tube: Tube, points: Array) -> tuple[Array, Array]:
-    """What the tube itself looks like, read around a curve (n, 3): how that bends and ends, and the blur of reading."""
+def as_fitted(image: Subtraction, tube: Tube, places: Array) -> tuple[Array, Array]:
+    """What the tube itself looks like at ``places_around`` a curve: how that bends and ends, and reading's blur."""
     with image.showing(tube.voxels, image.grey.reshape(-1)[tube.voxels] - tube.rest):
-        return read_around(image, points, tube.sigma)
+        return read_around(image, places)
 
 
 def oblong_end(image: Subtraction, points: Array, read: tuple[Array, Array], fitted: tuple[Array, Array]) -> float:

@@ -118,19 +118,3 @@ def subtract(
         a, b, c = i + corner[0], j + corner[1], corner[2]
         for k in range(first, stop):
             out[i, j, k] = frame[a, b, k + c] - background[i, j, k]
-
-
-@entry_point
-def above(grey: NDArray[Any], allowed: NDArray[Any], runs: NDArray[Any], level: float) -> NDArray[Any]:
-    """Flat indices of the voxels on ``runs`` that are allowed and brighter than ``level``."""
-    _, nj, nk = grey.shape
-    found = np.empty(4096, np.int64)
-    count = 0
-    for i, j, first, stop in runs:
-        for k in range(first, stop):
-            if grey[i, j, k] > level and allowed[i, j, k]:
-                if count >= found.shape[0]:
-                    found = grown(found)
-                found[count] = (i * nj + j) * nk + k
-                count += 1
-    return found[:count]

@@ -39,16 +39,19 @@ def factorise(matrix: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any], bool]:
 
 @entry_point
 def substitute(lower: NDArray[Any], first: NDArray[Any], right: NDArray[Any]) -> NDArray[Any]:
-    """x with L L^T x = right (n,)."""
-    n = right.shape[0]
+    """x (n, m) with L L^T x = right (n, m), all columns at a time: they are neighbours in memory."""
+    n, m = right.shape
     x = right.copy()
     for i in range(n):
-        total = x[i]
         for k in range(first[i], i):
-            total -= lower[i, k] * x[k]
-        x[i] = total / lower[i, i]
+            for c in range(m):
+                x[i, c] -= lower[i, k] * x[k, c]
+        for c in range(m):
+            x[i, c] /= lower[i, i]
     for i in range(n - 1, -1, -1):
-        x[i] /= lower[i, i]
+        for c in range(m):
+            x[i, c] /= lower[i, i]
         for k in range(first[i], i):
-            x[k] -= lower[i, k] * x[i]
+            for c in range(m):
+                x[k, c] -= lower[i, k] * x[i, c]
     return x
