@@ -57,12 +57,12 @@ def test_the_smallest_size_is_named_and_allowed(name: str) -> None:
     assert len(Wanted(size=smallest - 1).problems(scene)) == 1
 
 
-@pytest.mark.parametrize("seed", range(8))
 @pytest.mark.parametrize("name", catalogue.names())
-def test_natural_sizes_and_those_of_the_golden_tables_are_allowed(name: str, seed: int) -> None:
+def test_natural_sizes_and_those_of_the_golden_tables_are_allowed(name: str) -> None:
     scene = catalogue.describe(name)
-    assert Wanted(seed=seed).problems(scene) == []
-    assert Wanted(size=size_of(scene), frames=3, seed=seed).problems(scene) == []
+    for seed in range(8):
+        assert Wanted(seed=seed).problems(scene) == []
+        assert Wanted(size=size_of(scene), frames=3, seed=seed).problems(scene) == []
 
 
 @pytest.mark.parametrize(
