@@ -128,6 +128,13 @@ def test_own_wires_give_the_identical_table(tmp_path: Path, capsys: pytest.Captu
     assert "straight-tip" in (out / "simulators.html").read_text(encoding="utf-8")
 
 
+@pytest.fixture
+def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No page of a case is drawn: one of each simulator, which take most of a score."""
+    monkeypatch.setattr("pipeline.run.case.draw", lambda *_: None)
+
+
+@pytest.mark.usefixtures("undrawn")
 def test_a_third_party_in_a_bifurcation(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     manifest, out = synth("bifurcation", tmp_path / "study"), tmp_path / "out"
     words = ["score", str(manifest), "--curves", f"PyElastica={PEERS / 'bifurcation'}", "-o", str(out), *QUICK]
@@ -152,11 +159,9 @@ def test_a_third_party_in_a_bifurcation(tmp_path: Path, capsys: pytest.CaptureFi
     assert errors_of(out, "bifurcation")["branch_ok"].all()
 
 
-def test_any_simulator_s_failure_is_the_exit_code(
-    known: Known, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.mark.usefixtures("undrawn")
+def test_any_simulator_s_failure_is_the_exit_code(known: Known, tmp_path: Path) -> None:
     """That of a later one was exit 0, and stood in no failures.csv but its own."""
-    monkeypatch.setattr("pipeline.run.case.draw", lambda *_: None)  # six pages of cases, which nobody looks at
     manifest, good = known[0], PEERS / "bend"
     bad = write_csv(tmp_path / "bad", peers("bend"))
     sorted(bad.iterdir())[1].unlink()
@@ -507,6 +512,7 @@ def test_where_curves_are_looked_for(known: Known, tmp_path: Path, capsys: pytes
         assert heard.endswith("1 problem in the command line; nothing was run\n"), "it was in the manifest"
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_score_of_others_is_not_replaced(known: Known, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The same command with another --curves put its results in the place of the first ones."""
     one, two = write_csv(tmp_path / "one", known[1]), write_csv(tmp_path / "two", known[1])

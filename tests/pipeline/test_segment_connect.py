@@ -45,7 +45,7 @@ def noisy(seed, shape=(9, 10, 11)):
     return (100 + 700 * (blobs > 0) + rng.normal(0, 120, shape)).astype(np.int16)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(seed=st.integers(0, 10_000), adjacency=st.sampled_from([6, 26]), threshold=st.sampled_from([0.02, 0.3, 0.6]))
 def test_strengths_equal_naive_dijkstra_on_every_voxel(seed, adjacency, threshold):
     values = noisy(seed)
