@@ -34,6 +34,8 @@ Friction = Annotated[float, Field(ge=0, le=10, allow_inf_nan=False), Number]
 """Coulomb's coefficient: a hydrophilic wire has 0.01 to 0.1."""
 Turn = Annotated[float, Field(ge=-1e5, le=1e5, allow_inf_nan=False), Number]
 """An angle, degrees."""
+Spread = Annotated[float, Field(ge=0, le=180, allow_inf_nan=False), Number]
+"""Standard deviation of an angle, degrees: beyond half a turn nothing is known of it."""
 Step = Annotated[float, Field(ge=0.01, le=100, allow_inf_nan=False), Number]
 """Step along a curve, mm: below 10 µm a run would hang instead of getting more accurate."""
 Radius = Annotated[float, Field(ge=1e-3, le=20, allow_inf_nan=False), Number]

@@ -109,6 +109,16 @@ def _scene(args: Namespace) -> "NamedScene":
     return scene if args.friction is None else scene.with_friction(args.friction)
 
 
+def _thick(scene: "NamedScene") -> str:
+    """That nobody can trace a wire in slices so far apart as those of a real scan."""
+    from pipeline.trace.config import MOST_APART
+
+    spacing = [float(mm) for mm in scene.scan[0].spacing_mm] if scene.scan else [1.0]
+    apart = max(spacing) / min(spacing)
+    told = f"; its slices are {apart:.1f} times as thick as its pixels, no trace is accepted there"
+    return told if apart >= MOST_APART else ""
+
+
 def main(args: Namespace) -> int:
     """Exit 0 when the study is written, 2 on wrong input."""
     from data_synthetic import catalogue
@@ -141,7 +151,7 @@ def _one(args: Namespace) -> int:
         if problems:
             return complain(problems, "the command line")
         if args.background is not None:
-            say(f"{scene.name}: {scene.why}")
+            say(f"{scene.name}: {scene.why}{_thick(scene)}")
         chat("the true wire is computed: seconds to minutes")
         study = catalogue.build(scene, scanner=args.scanner, **numbers)
     except (ValueError, ImportError) as error:

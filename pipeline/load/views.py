@@ -108,5 +108,14 @@ def read_views(path: Path, count: int | None) -> list[View]:
         raise unusable(path, said(*next(sentences(error, data, _File.model_json_schema())))) from None
     if count is not None and len(file.frames) != count:
         raise unusable(path, f"holds {len(file.frames)} frames for {count} depths in insertion_mm; give one for each")
+    _require_each_once(path, file.frames)
     centre, leaf, fitted = np.array(file.isocentre_mm), np.array(file.leaf_mm), file.translation == "fitted"
     return [View(f.projection, centre, leaf, np.array(f.points_px, float), fitted) for f in file.frames]
+
+
+def _require_each_once(path: Path, frames: list[_Frame]) -> None:
+    first = [frames.index(frame) for frame in frames]
+    again = next((n for n, m in enumerate(first) if m < n), None)
+    if again is not None:
+        why = f"frame {again} has the projection and points_px of frame {first[again]}, and one picture counts once"
+        raise unusable(path, f"{why}; take one of the two out, here and in insertion_mm")

@@ -21,6 +21,7 @@ from pipeline.study.same_grid import apart
 NO_REFERENCE = "reference: none found (a file named reference.*); --reference names a scan without the wire"
 REFERENCE_NAMES = ("reference", "ref", "wire_free", "nowire", "empty")
 DEFAULT_RADIUS_MM = 0.18
+PACKED = ".zip", ".7z", ".rar", ".tar", ".tgz", ".gz", ".bz2", ".xz"
 AT_EDGE = "the end of the wire nearest to the edge of the first frame"
 IN_PLACE = "the end of the wire in the first frame that is where it was in the last"
 NOWHERE = np.zeros((0, 3))
@@ -84,6 +85,12 @@ def _deeper(folder: Path) -> str:
         f"; further down are scans: {names}; move each frame's own folder or file up into "
         f"{folder.resolve().name}/frames, or list them in a manifest (frames = [...])"
     )
+
+
+def _packed(folder: Path) -> str:
+    """A hint where what lies in the folder is packed, as data sets are handed out; empty where it is not."""
+    found = next((p.name for p in sorted(folder.iterdir()) if p.suffix.lower() in PACKED), "")
+    return f"; {found} is packed: unpack it" * bool(found)
 
 
 def _loose(folder: Path) -> str:
@@ -230,7 +237,7 @@ def infer_manifest(
     if not frames:
         allowed = f"files {', '.join(SUFFIXES)} or DICOM folders, here or in frames/"
         found = f"{reference.name} alone, a reference, and no frames" if reference else "no scans"
-        hint = _loose(folder) or _items(folder) or _deeper(folder)
+        hint = _loose(folder) or _items(folder) or _packed(folder) or _deeper(folder)
         raise unusable(folder, f"found {found}; allowed: {allowed}{hint}")
     seen = (
         f"frames: {len(frames)} scans in natural order, {frames[0].name} to {frames[-1].name}",

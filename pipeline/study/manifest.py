@@ -26,7 +26,7 @@ from pydantic.config import JsonDict
 from pipeline.load.geometry import LoadError
 from pipeline.load.guard import read_toml, status_of
 from pipeline.model import OverWire, Uncertainty, Wall, Wire
-from pipeline.ranges import Axis, Depth, Direction, Finite, Name, NonNegative, Number, Point, Positive
+from pipeline.ranges import Axis, Depth, Direction, Finite, Name, NonNegative, Number, Point, Positive, Spread
 from pipeline.status import InputError, did_you_mean
 from pipeline.study.borrowed import borrowing_problems
 from pipeline.study.catheter import catheter_problems
@@ -78,7 +78,7 @@ class Case(Strict):
     entry: Annotated[str, Field(pattern=r"^(case:.+)?$", json_schema_extra=ANOTHER)] = ""
     entry_case: Annotated["Case | None", *FILLED_IN] = None
     entry_sigma_mm: NonNegative | None = None
-    entry_direction_sigma_deg: NonNegative = 2.0
+    entry_direction_sigma_deg: Spread = 2.0
     material_axis: Axis | None = None
     wire: Annotated[Wire, BeforeValidator(_wire), WithJsonSchema(ONE_OF_THEM)]
     insertion_mm: Depths | None = None
@@ -94,7 +94,7 @@ class Case(Strict):
     calibrated_scans: Annotated[tuple[str, ...], *FILLED_IN] = ()
     calibrated_traces: Annotated[tuple[tuple[Point, ...], ...], *FILLED_IN] = ()
     roll_deg: Finite | PerFrame | Literal["fit"] = 0.0
-    roll_sigma_deg: NonNegative | None = None
+    roll_sigma_deg: Spread | None = None
     push_force_N: PerFrame | None = None
     push_force_sigma_N: Positive = 0.001
     lumen_seed_mm: Annotated[tuple[Point, ...], Field(min_length=1)] = Field(

@@ -8,6 +8,7 @@ import numpy as np
 from pipeline.load import Header, read_header
 from pipeline.load.curves import read_truth
 from pipeline.model import Array, arc_length
+from pipeline.simulate.clamp import FARTHEST_MM, LARGEST_TURN_DEG
 from pipeline.simulate.others import oddity
 from pipeline.study.devices import implausible, odd_catheter, odd_wall
 from pipeline.study.infer import beside
@@ -43,6 +44,20 @@ def leads_out(case: Case, header: Header | None) -> list[str]:
     return [
         f"entry_direction leads out of the scan {ahead:.1f} mm from entry_mm{stated}; the other way it holds "
         f"{behind:.0f} mm: entry_direction points the way the wire is pushed; is it turned round?"
+    ]
+
+
+def loose_entry(case: Case) -> list[str]:
+    """A sentence where the entry is known so badly that a budget explains nearly every error by it."""
+    stated = (
+        ("entry_sigma_mm", case.entry_sigma_mm or 0.0, FARTHEST_MM, "mm"),
+        ("entry_direction_sigma_deg", case.entry_direction_sigma_deg, LARGEST_TURN_DEG, "degrees"),
+    )
+    return [
+        f"{key} = {sigma:g}: a clamp that lies more than {most:g} {unit} off is not accepted, and of one that may, a "
+        "budget explains nearly every error; state how well it is known"
+        for key, sigma, most, unit in stated
+        if sigma > most
     ]
 
 
@@ -212,6 +227,7 @@ def in_case(case: Case, scan: Header | None) -> list[str]:
         *other_voxels(scan),
         *lost_header(scan),
         *leads_out(case, scan),
+        *loose_entry(case),
         *odd_depths(case, scan),
     ]
     thin = [*too_thin(case, scan), *slices_apart(case, scan)]

@@ -218,6 +218,13 @@ def test_scans_further_down_are_named(tmp_path: Path, monkeypatch: pytest.Monkey
     assert f"up into {tmp_path.name}/frames" in _deeper(Path()), "it was /frames, of the disk"
 
 
+def test_what_is_packed_is_to_be_unpacked(tmp_path: Path) -> None:
+    """A folder as a data set was handed out was "found no scans"."""
+    (tmp_path / "scan.zip").touch()
+    with pytest.raises(LoadError, match=r"scan\.zip is packed: unpack it"):
+        infer_manifest(tmp_path, None, None, None, LoadConfig())
+
+
 def test_the_wire_begins_where_it_stays_in_place() -> None:
     """A tip nearer to the edge of the scan than the entry was taken for it, and all traces ran backwards."""
 

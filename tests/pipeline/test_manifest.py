@@ -21,6 +21,7 @@ from pipeline.study.devices import implausible
 from pipeline.study.manifest import ManifestError, read_manifest
 from pipeline.study.plausible import (
     in_case,
+    loose_entry,
     lost_header,
     measured_otherwise,
     odd_depths,
@@ -269,6 +270,17 @@ def test_depths_that_go_down_are_a_warning(tmp_path: Path) -> None:
     for depths, count in (("[10, 20, 30, 20, 10]", 0), ("[10, 20, 19.9, 30]", 0), ("[30, 20, 10]", 1)):
         (case,) = read_manifest(written(tmp_path, text.replace("[14, 39, 20, 21, 8]", depths))).cases
         assert len(odd_depths(case, None)) == count
+
+
+def test_an_entry_that_may_be_anywhere_is_doubted(tmp_path: Path) -> None:
+    """With entry_sigma_mm = 5 no error was ever larger than what the inputs explain, without a word."""
+    case = read_manifest(written(tmp_path, GOOD)).cases[0]
+    assert loose_entry(case) == []
+    loose = case.model_copy(update={"entry_sigma_mm": 5.0, "entry_direction_sigma_deg": 30.0})
+    position, direction = loose_entry(loose)
+    assert position.startswith("entry_sigma_mm = 5: a clamp that lies more than 1 mm off is not accepted")
+    assert direction.startswith("entry_direction_sigma_deg = 30: a clamp that lies more than 10 degrees off")
+    assert {position, direction} <= set(in_case(loose, None))
 
 
 @pytest.mark.parametrize(("slices_mm", "told"), [(0.8, 0), (0.9, 1)])

@@ -11,11 +11,13 @@ import time
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from pipeline.cli import main
+from pipeline.commands import synth
 
 
 @pytest.mark.parametrize(
@@ -183,3 +185,11 @@ def _until(holds: Callable[[], bool]) -> None:
             return
         time.sleep(0.1)
     raise AssertionError("it never held")
+
+
+@pytest.mark.parametrize(("slices_mm", "told"), [(2.5, True), (1.0, False)])
+def test_slices_too_thick_for_a_wire_are_told_before_it_is_painted(slices_mm: float, told: bool) -> None:
+    """`check` said of the study that was written that no trace is accepted in it."""
+    grid = SimpleNamespace(spacing_mm=np.array([0.5, 0.5, slices_mm]))
+    assert ("5.0 times as thick as its pixels" in synth._thick(SimpleNamespace(scan=(grid, None)))) == told
+    assert synth._thick(SimpleNamespace(scan=None)) == ""

@@ -264,6 +264,7 @@ def test_projections_that_are_none_are_refused(known: Known, tmp_path: Path) -> 
         ({"frames": [{"matrix": [[0.0] * 4] * 3, "points_px": [[0, 0], [1, 1]]}] * 4}, "no point source"),
         ({"frames": [{"c_arm": dict.fromkeys(arm, [0.0] * 3), "points_px": [[0, 0], [1, 1]]}] * 4}, "no point source"),
         ({"translate": "none"}, "translate"),
+        ({"frames": [*good["frames"][:2], good["frames"][1], good["frames"][3]]}, "frame 2 has .* of frame 1"),
     ):
         file.write_text(json.dumps(good | change), encoding="utf-8")
         with pytest.raises(LoadError, match=said):

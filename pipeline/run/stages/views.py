@@ -112,7 +112,8 @@ def _limited(frames: Sequence[Frame], clues: Clues, config: CompareConfig) -> st
     if off <= radius * (2.0 if known[0].view is not None and known[0].view.fitted else 1.0):
         return ""
     return (
-        f"registration-limited: centreline {off:.1f} mm in a lumen of {radius:.1f} mm radius; no skill can be claimed"
+        f"registration-limited: centreline {off:.1f} mm in a lumen of {radius:.1f} mm radius; no skill can be claimed; "
+        "check isocentre_mm, matrix or c_arm, and points_px: pixels, in the order in which matrix gives them"
     )
 
 
