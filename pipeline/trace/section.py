@@ -28,6 +28,8 @@ PAIRED = 0.025
 """Median harmonic from which a line is two wires in contact all along: two have 0.028 and more (0.3 to 0.5 mm wires in
 voxels of 0.3 mm, blurred alike or 1.3 times as much along one axis), one has 0.02 and less, but 1 of 60 0.027, beside
 a wall that no reference shows. Uneven voxels make a round wire oblong by 0.018 at 1.6 to 1."""
+BY_SCANNER = 1.3
+"""Times that where no wall tells how sharp the scanner is along each axis."""
 MEDIAN = 1.18
 """Median of a complex number's size over the standard deviation of its parts."""
 SURE = 2.0
@@ -95,7 +97,7 @@ class Section:
 
     harmonic : second, of the ring's grey (n,).     grey : on the axis, averaged over OVER_MM (n,).
     step_mm : between points.     window : weights of that average.     noise : of ``oblong`` where the wire has its
-    usual height.
+    usual height.     allowed : what one wire's may be, over that of a wire whose scanner is known and voxels are cubes.
     """
 
     harmonic: NDArray[np.complex128]
@@ -103,6 +105,7 @@ class Section:
     step_mm: float
     window: Array
     noise: float
+    allowed: float
 
     @cached_property
     def oblong(self) -> Array:
@@ -133,11 +136,14 @@ def section_along(image: Subtraction, points: Array, read: tuple[Array, Array], 
     independent = max(1.0, min(OVER_MM, width * step) / (INDEPENDENT_VOXELS * image.voxel))
     usual = max(float(np.median(axis)), 1e-9)
     noise = float(image.noise_in(CREST_VOXELS) * np.sqrt(4.0 / ANGLES / independent) / usual)
-    harmonic = second_harmonic(ring) - _of_the_scanner(image, points, sigma) * axis
-    return Section(harmonic, axis, step, window, noise)
+    harmonic, blur = second_harmonic(ring), blur_by_axis(image, points, sigma)
+    allowed = float(np.max(image.spacing) / np.min(image.spacing))  # slices make a round wire oblong, too
+    if blur is None:
+        return Section(harmonic, axis, step, window, noise, BY_SCANNER * allowed)
+    return Section(harmonic - _of_the_scanner(image, points, sigma, blur) * axis, axis, step, window, noise, allowed)
 
 
-def paired(image: Subtraction, section: Section, length_mm: float) -> float:
+def paired(section: Section, length_mm: float) -> float:
     """How far out of round the whole line is, over what one wire's may be: above 1 it is two in contact all along, side
     by side or turned about each other.
 
@@ -147,7 +153,7 @@ def paired(image: Subtraction, section: Section, length_mm: float) -> float:
     tried = [(section.oblong, SURE), *((section.turned(twist), SURE_TWISTED) for twist in TWISTS)]
     of_noise = MEDIAN * section.noise
     left = [float(np.median(o)) ** 2 - (of_noise * (1.0 + sure / np.sqrt(independent))) ** 2 for o, sure in tried]
-    return float(np.sqrt(max(0.0, *left))) / (PAIRED * (1.0 + _unevenness(image)))
+    return float(np.sqrt(max(0.0, *left))) / (PAIRED * section.allowed)
 
 
 def paired_in_part(image: Subtraction, section: Section, fitted: NDArray[np.complex128]) -> float:
@@ -172,22 +178,18 @@ def paired_in_part(image: Subtraction, section: Section, fitted: NDArray[np.comp
     if image.modelled:  # beside a wall that no reference shows a line is out of round, always the same way
         return twisted
     beyond = np.sqrt(np.maximum(0.0, mean(rest) ** 2 - (SURE_STRETCH * of_noise) ** 2))
-    return max(twisted, float(beyond.max()) / (STRETCHED * (1.0 + _unevenness(image))))
+    return max(twisted, float(beyond.max()) / (STRETCHED * section.allowed))
 
 
-def _of_the_scanner(image: Subtraction, points: Array, sigma: float) -> NDArray[np.complex128]:
-    """The harmonic (n,) over the grey on the axis of a round wire, blurred by a scanner less sharp along some axes.
+def _of_the_scanner(image: Subtraction, points: Array, sigma: float, blur: Array) -> NDArray[np.complex128]:
+    """The harmonic (n,) over the grey on the axis of a round wire. blur : of ``blur_by_axis``.
 
     A blur whose square is larger by D across the wire makes exp(-x^2 / 2 s^2) larger by x^2 D / 2 s^4.
     """
     u, v = carried(_directions(points))
     seen, radius = sigma**2 + (CREST_VOXELS * image.voxel) ** 2, RING_BLURS * sigma
     usual = np.exp(-0.5 * radius**2 / seen) * radius**2 / (4.0 * seen**2)
-    return np.asarray(usual * (u + 1j * v) ** 2 @ blur_by_axis(image, points, sigma))
-
-
-def _unevenness(image: Subtraction) -> float:
-    return float(np.max(image.spacing) / np.min(image.spacing)) - 1.0
+    return np.asarray(usual * (u + 1j * v) ** 2 @ blur)
 
 
 def fills_vessel(image: Subtraction, points: Array, sigma: float) -> bool:

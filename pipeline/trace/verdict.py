@@ -188,7 +188,7 @@ def judge(image: Subtraction, attempt: Attempt, points: Array, bridged: NDArray[
 def _pair(image: Subtraction, section: Section, fitted: tuple[Array, Array], length_mm: float) -> float:
     """How far out of round the line is, all along or in part, over what one wire's may be."""
     in_part = paired_in_part(image, section, second_harmonic(fitted[0]))
-    return max(paired(image, section, length_mm), in_part)
+    return max(paired(section, length_mm), in_part)
 
 
 def _of_the_line(
