@@ -18,6 +18,9 @@ THINNED, LEAST_PLACES = 3, 1000
 CELL_MM, SURE_STEP = 6.0, 5.0
 """Cells in which the medium is as bright all over, and how many standard deviations of it a step has to have: contrast
 that decays along the vessel by 60 % passes for a blur otherwise, as the vessel turns."""
+MOST = 0.7
+"""Largest difference that is told, over the blur's square: a blur 1.4 times as wide along one axis. A wider one makes
+some of two wires in contact as round as one."""
 INNER_BLURS, EVEN = 1.5, 1.2
 """From how far inside, in blurs, the medium of a cell may differ from its level by so many standard deviations of noise
 (rms): 0.9 to 1.05 in most, 1.2 where contrast decays, 1.4 to 2.8 where it has settled or a bone lies in the lumen."""
@@ -25,7 +28,7 @@ INNER_BLURS, EVEN = 1.5, 1.2
 
 def blur_by_axis(image: Subtraction, points: Array, sigma: float) -> Array | None:
     """How much larger the square of the scanner's blur is along each axis (3,) than usual, mm^2; None where no wall is
-    there to tell.
+    there to tell, and where that is so much that it hides a second wire.
 
     points, sigma : the wire's curve (n, 3) and blur, which is left out.  The profile of a wall with the unit normal n
     is as wide as the sum of n_k^2 times the square of the blur along axis k; a wall that lies off, or bends, moves it.
@@ -50,7 +53,7 @@ def blur_by_axis(image: Subtraction, points: Array, sigma: float) -> Array | Non
     wider = (rise**2 / steep[:, None]) * (0.5 * depth * density / blur**2)[:, None]
     left = [_beside_step(cell, ndtr(-depth), column) for column in (*wider.T, density, share)]
     found = np.linalg.lstsq(np.column_stack(left[:-1]), left[-1], rcond=None)[0][:3]
-    return np.asarray(found - found.mean())
+    return np.asarray(found - found.mean()) if np.ptp(found) < MOST * blur**2 else None
 
 
 def _beside_wall(image: Subtraction, points: Array, sigma: float) -> NDArray[np.int64]:
