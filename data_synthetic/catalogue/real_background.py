@@ -59,10 +59,10 @@ def background_scene(path: str | Path, voxel_mm: float | None = None) -> NamedSc
 
 def read_scan(path: Path, voxel_mm: float | None) -> tuple[Volume, ScanGrid]:
     """Grey values indexed x, y, z, and where they lie; ValueError for what is no volume of grey values."""
-    series = sitk.ImageSeriesReader.GetGDCMSeriesFileNames(str(path)) if path.is_dir() else str(path)
-    if path.is_dir():
-        _equally_far_apart(path, series)
     try:
+        series = sitk.ImageSeriesReader.GetGDCMSeriesFileNames(str(path)) if path.is_dir() else str(path)
+        if path.is_dir():
+            _equally_far_apart(path, series)
         image: Any = sitk.ReadImage(series)
     except RuntimeError:
         allowed = "a file that SimpleITK reads, or a folder with one DICOM series"

@@ -73,7 +73,7 @@ def tangents(curve_mm: ArrayLike, arc_mm: Array, reach_mm: float) -> Array:
 
 
 def crossed(a: Array, b: Array) -> Array:
-    """Cross products (..., 3), as ``np.cross`` has them, in a quarter of its time where there are few."""
+    """Cross products of two arrays (..., 3) of one shape, in a quarter of ``np.cross``'s time where they are few."""
     (a0, a1, a2), (b0, b1, b2) = a.T, b.T
     return np.array([a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0]).T
 

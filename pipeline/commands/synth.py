@@ -110,12 +110,12 @@ def _scene(args: Namespace) -> "NamedScene":
 
 
 def _thick(scene: "NamedScene") -> str:
-    """That nobody can trace a wire in slices so far apart as those of a real scan."""
+    """What is to be said of a real scan whose slices lie too far apart for any trace; empty elsewhere."""
     from pipeline.trace.config import MOST_APART
 
     spacing = [float(mm) for mm in scene.scan[0].spacing_mm] if scene.scan else [1.0]
     apart = max(spacing) / min(spacing)
-    told = f"; its slices are {apart:.1f} times as thick as its pixels, no trace is accepted there"
+    told = f"; its slices are {apart:.1f} times as thick as its pixels: no trace is accepted there"
     return told if apart >= MOST_APART else ""
 
 

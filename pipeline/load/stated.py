@@ -19,13 +19,13 @@ def stated_in(path: Path, kind: str) -> tuple[str, str]:
     if kind == ".csv":
         return _of_table(path)
     with path.open("rb") as file:
-        head = file.read(HEAD).decode("latin-1")
-    # 3D Slicer's files: LPS and mm unless they say otherwise; in VTK's it writes the space
-    slicer, vtk = kind == ".mrk.json", space_of(head.encode("latin-1"))
+        head = file.read(HEAD)
+    # 3D Slicer's files are in mm: its own, LPS unless they say otherwise, and VTK's, in which it writes SPACE=;
     # "space = ras" in a title is not written by Slicer, and says nothing of the unit
-    default = "mm" * (slicer or (bool(vtk) and "SPACE" in head))
-    unit = _UNIT.search(head)
-    return vtk or "LPS" * slicer, (unit[1] or unit[2]).lower() if unit else default
+    markups, space = kind == ".mrk.json", space_of(head)
+    slicer = markups or (bool(space) and b"SPACE" in head)
+    unit = _UNIT.search(head.decode("latin-1"))
+    return space or "LPS" * markups, (unit[1] or unit[2]).lower() if unit else "mm" * slicer
 
 
 def _of_table(path: Path) -> tuple[str, str]:

@@ -88,8 +88,11 @@ def _deeper(folder: Path) -> str:
 
 
 def _packed(folder: Path) -> str:
-    """A hint where what lies in the folder is packed, as data sets are handed out; empty where it is not."""
-    found = next((p.name for p in sorted(folder.iterdir()) if p.suffix.lower() in PACKED), "")
+    """A hint where what lies in the folder is packed, as data sets are handed out; empty where it is not.
+
+    A .nii.gz is a scan as it is.
+    """
+    found = next((p.name for p in sorted(folder.iterdir()) if p.suffix.lower() in PACKED and not _is_scan(p)), "")
     return f"; {found} is packed: unpack it" * bool(found)
 
 
@@ -237,7 +240,7 @@ def infer_manifest(
     if not frames:
         allowed = f"files {', '.join(SUFFIXES)} or DICOM folders, here or in frames/"
         found = f"{reference.name} alone, a reference, and no frames" if reference else "no scans"
-        hint = _loose(folder) or _items(folder) or _packed(folder) or _deeper(folder)
+        hint = _loose(folder) or _items(folder) or _deeper(folder) or _packed(folder)
         raise unusable(folder, f"found {found}; allowed: {allowed}{hint}")
     seen = (
         f"frames: {len(frames)} scans in natural order, {frames[0].name} to {frames[-1].name}",

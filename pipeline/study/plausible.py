@@ -54,8 +54,8 @@ def loose_entry(case: Case) -> list[str]:
         ("entry_direction_sigma_deg", case.entry_direction_sigma_deg, LARGEST_TURN_DEG, "degrees"),
     )
     return [
-        f"{key} = {sigma:g}: a clamp that lies more than {most:g} {unit} off is not accepted, and of one that may, a "
-        "budget explains nearly every error; state how well it is known"
+        f"{key} = {sigma:g}: a clamp that lies more than {most:g} {unit} off is not accepted, and with an entry known "
+        "so badly a budget explains nearly every error; measure it, or state how well it is really known"
         for key, sigma, most, unit in stated
         if sigma > most
     ]

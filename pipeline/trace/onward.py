@@ -60,7 +60,8 @@ TANGENT_MM = 1.5
 def _near(region: SearchRegion, corner: Array, high: Array) -> SearchRegion:
     """The region with the axis's voxels within a box (indices) alone."""
     layer = int(np.prod(region.box.shape[1:]))
-    first, stop = np.searchsorted(region.axis, (corner[0] * layer, (high[0] + 1) * layer))
+    # whole numbers: for others all of the axis's voxels would be turned into such
+    first, stop = np.searchsorted(region.axis, np.array([corner[0], high[0] + 1], np.int64) * layer)
     flat = region.axis[first:stop]
     index = unflattened(flat, region.box.shape)
     return replace(region, axis=flat[np.all((index >= corner) & (index <= high), axis=1)])

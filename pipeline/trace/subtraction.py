@@ -191,14 +191,16 @@ def subtracted(frame: Volume, lumen: Lumen, reference: Volume | None) -> Subtrac
     background, still = background_of(grid, reference, region, lumen, axes)
     grey = region.greys.take()
     subtract(grid.values, background, region.corner, region.runs, grey)
-    seen = region.sampled(grid)
-    gain = 1.0 if still is None else matched(grey, background, region, seen, still)
+    gain, copied = 1.0, 0.0
+    if still is not None:
+        seen = region.sampled(grid)
+        gain, copied = matched(grey, background, region, seen, still), copied_share(seen, still, region.sampled_runs)
     noise = spread(grey.reshape(-1)[region.within])
     total, read = float(np.prod(grid.shape)), float(np.sum(region.runs[:, 3] - region.runs[:, 2]))
     counters = {"voxels_total": total, "voxels_read": read, "voxels_skipped": total - read}
     blur = wall_blur(lumen, float(np.min(region.box.spacing_mm)))
     modelled, levels = reference is None or gain != 1.0, {"noise": noise, "gain": gain}
-    if still is not None and (copied := copied_share(seen, still, region.sampled_runs)):
+    if copied:
         levels["copied"] = copied
     uneven = modelled and lumen.levels.get("least_filling", 1.0) < UNEVEN
     return Subtraction(region, grey, max(noise, 1e-6), modelled, blur, grid, uneven, counters, levels)

@@ -165,9 +165,11 @@ def judge(image: Subtraction, attempt: Attempt, points: Array, bridged: NDArray[
     faint = (share < FAINT + noise) & (ends > MEAN_OVER_MM) & ~known
     places = places_around(points, attempt.tube.sigma)
     read = read_around(image, places)
-    section = section_along(image, points, read, attempt.tube.sigma)
-    double = beside_itself(points, step, BESIDE_VOXELS * image.voxel)
+    fitted = as_fitted(image, attempt.tube, places)
+    double, pair = beside_itself(points, step, BESIDE_VOXELS * image.voxel), 0.0
     if not image.thick_slices:
+        section = section_along(image, points, read, attempt.tube.sigma)
+        pair = _pair(image, section, fitted, length_mm)
         alone = share / of_one_strand(share, (ends > MEAN_OVER_MM) & ~bridged & ~faint)
         double |= doubled(alone, section.oblong, np.maximum(DOUBLE, 1.0 + 4.0 * noise), section.noise)
     outside = _outside(image, points)
@@ -175,8 +177,6 @@ def judge(image: Subtraction, attempt: Attempt, points: Array, bridged: NDArray[
     objections = of_the_frame(image) + of_the_way(attempt, length_mm)
     objections += _of_the_line(image, attempt, points, (share, noise, outside), (faint_mm, double_mm, length_mm))
     folded = bool(beside_itself(points, step, TIP_BESIDE * image.voxel)[-1])
-    fitted = as_fitted(image, attempt.tube, places)
-    pair = 0.0 if image.thick_slices else _pair(image, section, fitted, length_mm)
     objections += of_a_pair(pair, attempt)
     objections += of_the_ends(image, attempt, points, length_mm, folded=folded) + of_the_lumen(image, attempt, points)
     objections += of_its_width(image, attempt, points, (read, fitted), folded=folded)

@@ -220,9 +220,19 @@ def test_scans_further_down_are_named(tmp_path: Path, monkeypatch: pytest.Monkey
 
 def test_what_is_packed_is_to_be_unpacked(tmp_path: Path) -> None:
     """A folder as a data set was handed out was "found no scans"."""
+
+    def said() -> str:
+        with pytest.raises(LoadError) as error:
+            infer_manifest(tmp_path, None, None, None, LoadConfig())
+        return str(error.value)
+
+    (tmp_path / "reference.nii.gz").touch()
+    assert "is packed" not in said(), "a scan was to be unpacked"
     (tmp_path / "scan.zip").touch()
-    with pytest.raises(LoadError, match=r"scan\.zip is packed: unpack it"):
-        infer_manifest(tmp_path, None, None, None, LoadConfig())
+    assert said().endswith("; scan.zip is packed: unpack it")
+    (tmp_path / "scan").mkdir()
+    (tmp_path / "scan" / "first.mha").touch()
+    assert "further down are scans: scan/first.mha" in said(), "it was unpacked, and told to be"
 
 
 def test_the_wire_begins_where_it_stays_in_place() -> None:

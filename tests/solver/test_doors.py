@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 import re
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -272,7 +272,7 @@ CASES = [
 
 @pytest.mark.parametrize(("call", "name", "values"), CASES)
 def test_what_cannot_be_used_is_refused_by_name_at_the_call(
-    call: Callable[..., Any], name: str, values: Iterable[Any]
+    call: Callable[..., Any], name: str, values: list[Any]
 ) -> None:
     word = {"distance": "(distance|grid values)", "start": "(start|crop)", "stop": "(stop|crop)"}.get(name, name)
     said = []

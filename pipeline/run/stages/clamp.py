@@ -14,7 +14,7 @@ from pipeline.run.stages.segment import segment_vessel
 from pipeline.run.stages.trace import trace_frames
 from pipeline.simulate import altered, insertion_of, together
 from pipeline.simulate.clamp import TracedFrame, estimated_clamp
-from pipeline.simulate.departures import beside
+from pipeline.simulate.departures import beside, departed
 from pipeline.simulate.evidence import UNKNOWN_VOXELS
 from pipeline.simulate.resolution import lengths_mm
 from pipeline.study.manifest import Case
@@ -32,8 +32,8 @@ def clamp_of(run: Context, known: Known) -> Clamp:
     if run.case.entry_case is not None:
         return _of_another(run, run.case.entry_case, given, known.frames)
     clamp = estimated_clamp(seen, given, prior, lambda *args: _replayed(run, known, *args), voxel_mm)
-    # stated better than traces show it, an entry hardly moves, and ``departed`` has nothing to say
-    if prior.sigma_mm < UNKNOWN_VOXELS * voxel_mm and "entry_sigma_mm" not in clamp.warning:
+    # stated better than traces show it, an entry hardly moves, which is no departure from what is stated
+    if prior.sigma_mm < UNKNOWN_VOXELS * voxel_mm and not departed(given, clamp, prior.sigma_mm, 0.0):
         clamp = replace(clamp, warning="; ".join(filter(None, (clamp.warning, passed))))
     run.log.assumptions += [clamp.note] * bool(clamp.note)
     run.log.warnings += [clamp.warning] * bool(clamp.warning)

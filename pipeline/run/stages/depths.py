@@ -126,12 +126,12 @@ def in_another_order(frames: Sequence[Frame], depths_mm: Mapping[int, float], to
 
 def perhaps_turned(frames: Sequence[Frame]) -> list[Frame]:
     """The frames; one that is refused for its length, and whose trace has hardly begun, may run the wrong way."""
+    out = list(frames)
     wrong = FrameStatus.LENGTH_MISMATCH.identifier
-    advice = "or entry_direction points back along the wire: turn it round"
-    short = [
-        f.curve is not None and f.status == wrong and hardly_begun(f.curve.length_mm, f.expected_mm) for f in frames
-    ]
-    return [replace(f, message=f"{f.message}; {advice}") if so else f for f, so in zip(frames, short, strict=True)]
+    for n, f in enumerate(frames):
+        if f.status == wrong and f.curve is not None and hardly_begun(f.curve.length_mm, f.expected_mm):
+            out[n] = replace(f, message=f"{f.message}; or entry_direction points back along the wire: turn it round")
+    return out
 
 
 def turned_round(frames: Sequence[Frame]) -> list[Frame]:
