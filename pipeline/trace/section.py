@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from pipeline.model import Array
 from pipeline.trace.profile import INDEPENDENT_VOXELS
-from pipeline.trace.sharpness import blur_by_axis
 from pipeline.trace.subtraction import CREST_VOXELS, Subtraction
 
 ANGLES = 12
@@ -24,17 +23,14 @@ OVER_MM = 3.0
 """Length over which the harmonic is averaged: over less, a crossing stands out."""
 
 
-PAIRED = 0.025
-"""Median harmonic from which a line is two wires in contact all along: two have 0.028 and more (0.3 to 0.5 mm wires in
-voxels of 0.3 mm, blurred alike or 1.3 times as much along one axis), one has 0.02 and less, but 1 of 60 0.027, beside
-a wall that no reference shows. Uneven voxels make a round wire oblong by 0.018 at 1.6 to 1."""
-BY_SCANNER = 1.3
-"""Times that where no wall tells how sharp the scanner is along each axis."""
+PAIRED = 0.03
+"""Median harmonic from which a line is two wires in contact all along: two have 0.031 and more (0.3 to 0.5 mm wires in
+voxels of 0.3 mm), one has 0.022 and less. Uneven voxels make a round wire oblong by 0.018 at 1.6 to 1."""
 MEDIAN = 1.18
 """Median of a complex number's size over the standard deviation of its parts."""
 SURE = 2.0
 """Three standard deviations of the median of n independent ones, over that median, times the square root of n."""
-STRETCH_MM, STRETCHED, SURE_STRETCH = 10.0, 0.02, 3.0
+STRETCH_MM, STRETCHED, SURE_STRETCH = 10.0, 0.024, 3.0
 """Length over which alone two wires may lie so that they are seen as two, the mean harmonic there from which they are,
 and standard deviations of that mean: bends turn the offset of a copy moved aside into the wires' own direction, and the
 rest of the line is as round as one. Right lines have up to 0.015 beyond noise where the background was measured; where
@@ -44,6 +40,9 @@ TURNS, TURNING, SURE_TURNING = np.arange(0.22, 0.43, 0.02), 0.012, 4.0
 away (pitches of 2.4 to 4.5 mm), the least mean harmonic over STRETCH_MM, turned back, of such a pair, and its standard
 deviations. Blur leaves 0.03 of 0.4 mm wires in contact with a pitch of 4 mm and 0.02 with one of 3, 6 standard
 deviations and more; right lines had up to 2.7, and 0.008 where noise allows less than 0.005."""
+MOST_OF_SCANNER = 0.045
+"""The most that a scanner's own blur, sharper along one of its axes than along another, makes of that: a ratio of 1.2
+makes 0.04 where the wire lies across. Two wires 0.5 mm apart have up to 0.07."""
 TWISTS, SURE_TWISTED = (-0.2, -0.15, -0.1, -0.05, 0.05, 0.1, 0.15, 0.2), 2.7
 """Turns per mm of two wires about each other that are looked for, so near each other that what is averaged over OVER_MM
 stays in phase: pitches from 4.5 mm up. Four standard deviations, as the largest of several is taken."""
@@ -97,7 +96,7 @@ class Section:
 
     harmonic : second, of the ring's grey (n,).     grey : on the axis, averaged over OVER_MM (n,).
     step_mm : between points.     window : weights of that average.     noise : of ``oblong`` where the wire has its
-    usual height.     allowed : what one wire's may be, over that of a wire whose scanner is known and voxels are cubes.
+    usual height.
     """
 
     harmonic: NDArray[np.complex128]
@@ -105,7 +104,6 @@ class Section:
     step_mm: float
     window: Array
     noise: float
-    allowed: float
 
     @cached_property
     def oblong(self) -> Array:
@@ -123,11 +121,8 @@ class Section:
         return np.maximum(self.grey, max(0.3 * float(np.median(self.grey)), 1e-9))
 
 
-def section_along(image: Subtraction, points: Array, read: tuple[Array, Array], sigma: float) -> Section:
-    """The section along a curve (n, 3) of blur ``sigma``, without what the scanner makes of a round wire's.
-
-    read : of ``read_around``.
-    """
+def section_along(image: Subtraction, points: Array, read: tuple[Array, Array]) -> Section:
+    """The section along a curve (n, 3). read : of ``read_around``."""
     ring, grey = read
     step = float(np.mean(np.linalg.norm(np.diff(points, axis=0), axis=1)))
     width = min(len(points), max(1, round(OVER_MM / step)))
@@ -136,14 +131,10 @@ def section_along(image: Subtraction, points: Array, read: tuple[Array, Array], 
     independent = max(1.0, min(OVER_MM, width * step) / (INDEPENDENT_VOXELS * image.voxel))
     usual = max(float(np.median(axis)), 1e-9)
     noise = float(image.noise_in(CREST_VOXELS) * np.sqrt(4.0 / ANGLES / independent) / usual)
-    harmonic, blur = second_harmonic(ring), blur_by_axis(image, points, sigma)
-    allowed = float(np.max(image.spacing) / np.min(image.spacing))  # slices make a round wire oblong, too
-    if blur is None:
-        return Section(harmonic, axis, step, window, noise, BY_SCANNER * allowed)
-    return Section(harmonic - _of_the_scanner(image, points, sigma, blur) * axis, axis, step, window, noise, allowed)
+    return Section(second_harmonic(ring), axis, step, window, noise)
 
 
-def paired(section: Section, length_mm: float) -> float:
+def paired(image: Subtraction, section: Section, length_mm: float) -> float:
     """How far out of round the whole line is, over what one wire's may be: above 1 it is two in contact all along, side
     by side or turned about each other.
 
@@ -153,13 +144,13 @@ def paired(section: Section, length_mm: float) -> float:
     tried = [(section.oblong, SURE), *((section.turned(twist), SURE_TWISTED) for twist in TWISTS)]
     of_noise = MEDIAN * section.noise
     left = [float(np.median(o)) ** 2 - (of_noise * (1.0 + sure / np.sqrt(independent))) ** 2 for o, sure in tried]
-    return float(np.sqrt(max(0.0, *left))) / (PAIRED * section.allowed)
+    return float(np.sqrt(max(0.0, *left))) / (PAIRED * (1.0 + _unevenness(image)))
 
 
-def paired_in_part(image: Subtraction, section: Section, fitted: NDArray[np.complex128]) -> float:
+def paired_in_part(image: Subtraction, section: Section, fitted: NDArray[np.complex128], points: Array) -> float:
     """The same over STRETCH_MM alone, where that says most, side by side or closely twisted.
 
-    fitted : harmonic (n,) of the fitted tube, which is not round on the rings of a sharp bend.
+    fitted : harmonic (n,) of the fitted tube, which is not round on the rings of a sharp bend.     points : (n, 3).
     """
     width = round(STRETCH_MM / section.step_mm)
     if width > len(section.grey):
@@ -168,6 +159,7 @@ def paired_in_part(image: Subtraction, section: Section, fitted: NDArray[np.comp
     grey = np.maximum(np.convolve(section.grey, window, "valid"), usual)  # that of a coil is its own
     of_noise = section.noise * np.sqrt(OVER_MM / STRETCH_MM) * usual / grey
     rest = section.harmonic - fitted
+    rest = rest - _of_the_scanner(rest, section.grey, points)
 
     def mean(harmonic: NDArray[np.complex128]) -> Array:
         return np.asarray(np.abs(np.convolve(harmonic, window, "valid")) / grey)
@@ -178,18 +170,23 @@ def paired_in_part(image: Subtraction, section: Section, fitted: NDArray[np.comp
     if image.modelled:  # beside a wall that no reference shows a line is out of round, always the same way
         return twisted
     beyond = np.sqrt(np.maximum(0.0, mean(rest) ** 2 - (SURE_STRETCH * of_noise) ** 2))
-    return max(twisted, float(beyond.max()) / (STRETCHED * section.allowed))
+    return max(twisted, float(beyond.max()) / (STRETCHED * (1.0 + _unevenness(image))))
 
 
-def _of_the_scanner(image: Subtraction, points: Array, sigma: float, blur: Array) -> NDArray[np.complex128]:
-    """The harmonic (n,) over the grey on the axis of a round wire. blur : of ``blur_by_axis``.
+def _of_the_scanner(harmonic: NDArray[np.complex128], grey: Array, points: Array) -> NDArray[np.complex128]:
+    """The part of a harmonic (n,) that a blur which differs along the scan's axes explains best, by least squares.
 
-    A blur whose square is larger by D across the wire makes exp(-x^2 / 2 s^2) larger by x^2 D / 2 s^4.
+    Scanners are as sharp along their axis as across it to 10 or 20 %, which makes every round wire as oblong as two.
     """
     u, v = carried(_directions(points))
-    seen, radius = sigma**2 + (CREST_VOXELS * image.voxel) ** 2, RING_BLURS * sigma
-    usual = np.exp(-0.5 * radius**2 / seen) * radius**2 / (4.0 * seen**2)
-    return np.asarray(usual * (u + 1j * v) ** 2 @ blur)
+    shapes = (u + 1j * v).T ** 2 * grey
+    design = np.concatenate([shapes.real, shapes.imag], axis=1).T
+    blur = np.linalg.lstsq(design, np.concatenate([harmonic.real, harmonic.imag]), rcond=None)[0]
+    return np.asarray(min(1.0, MOST_OF_SCANNER / max(float(np.ptp(blur)), 1e-12)) * blur @ shapes)
+
+
+def _unevenness(image: Subtraction) -> float:
+    return float(np.max(image.spacing) / np.min(image.spacing)) - 1.0
 
 
 def fills_vessel(image: Subtraction, points: Array, sigma: float) -> bool:

@@ -168,8 +168,8 @@ def judge(image: Subtraction, attempt: Attempt, points: Array, bridged: NDArray[
     fitted = as_fitted(image, attempt.tube, places)
     double, pair = beside_itself(points, step, BESIDE_VOXELS * image.voxel), 0.0
     if not image.thick_slices:
-        section = section_along(image, points, read, attempt.tube.sigma)
-        pair = _pair(image, section, fitted, length_mm)
+        section = section_along(image, points, read)
+        pair = _pair(image, section, fitted, points, length_mm)
         alone = share / of_one_strand(share, (ends > MEAN_OVER_MM) & ~bridged & ~faint)
         double |= doubled(alone, section.oblong, np.maximum(DOUBLE, 1.0 + 4.0 * noise), section.noise)
     outside = _outside(image, points)
@@ -185,10 +185,10 @@ def judge(image: Subtraction, attempt: Attempt, points: Array, bridged: NDArray[
     return Verdict(*first, bridged | faint | double | outside, faint_mm, double_mm)
 
 
-def _pair(image: Subtraction, section: Section, fitted: tuple[Array, Array], length_mm: float) -> float:
+def _pair(image: Subtraction, section: Section, fitted: tuple[Array, Array], points: Array, length_mm: float) -> float:
     """How far out of round the line is, all along or in part, over what one wire's may be."""
-    in_part = paired_in_part(image, section, second_harmonic(fitted[0]))
-    return max(paired(section, length_mm), in_part)
+    in_part = paired_in_part(image, section, second_harmonic(fitted[0]), points)
+    return max(paired(image, section, length_mm), in_part)
 
 
 def _of_the_line(
