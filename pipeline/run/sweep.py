@@ -60,15 +60,16 @@ def points_of(texts: Sequence[str], base: Sequence[Setting]) -> list[SweepPoint]
     """``table.key=v1,v2`` texts as points; raises SettingsError for an unknown setting or value."""
     points: dict[tuple[str, str], SweepPoint] = {}
     for text in texts:
-        name, equals, values = text.partition("=")
+        written, equals, values = text.partition("=")
+        name = written.strip()
         if not equals or not values.strip():
             raise SettingsError([f"--sweep {text!r}: write table.key=value1,value2"])
-        if name.strip() == "compare.simulated_nulls" or name.strip().startswith("budget."):
+        if name == "compare.simulated_nulls" or name.startswith("budget."):
             why = "points are computed without simulated predictors and without a budget"
             raise SettingsError([f"--sweep {text!r}: {why}, so that this changes no number of them; use --set"])
         for value in values.split(","):
             setting = parse_assignment(f"{name}={value}", "sweep")
-            point = SweepPoint(name.strip(), value.strip(), resolve([*base, setting]))
+            point = SweepPoint(name, value.strip(), resolve([*base, setting]))
             # 0.1 and 0.10 are one point
             points.setdefault((point.parameter, repr(attrgetter(point.parameter)(point.settings.config))), point)
     return [*points.values()]

@@ -183,19 +183,17 @@ def test_a_second_wire_that_is_a_copy_moved_aside_is_seen_in_part(seed):
     assert "out of round over 10 mm" in curve.note
 
 
-def less_sharp(scene, ratio, axis=2):
-    """As a scanner sees it whose blur is so many times as large along one axis."""
-    more = np.sqrt(ratio**2 - 1.0) * 0.85
-    scans = [v and replace(v, values=ndimage.gaussian_filter1d(v.values.astype(np.float32), more, axis=axis))
-             for v in (scene.frame, scene.reference)]  # fmt: skip
-    return replace(scene, frame=scans[0], reference=scans[1])
-
-
 @pytest.mark.parametrize("ratio", [1.1, 1.2])
 def test_a_scanner_that_is_sharper_across_its_axis_makes_no_pair_of_one_wire(ratio):
     """Blur that is a fifth larger along one axis refused every second wire as two in contact."""
     for seed in range(2):
-        _, curve = seen(less_sharp(Draft(np.random.default_rng([seed, 13])).scan(16), ratio))
+        scene = Draft(np.random.default_rng([seed, 13])).scan(16)
+        more = np.sqrt(ratio**2 - 1.0) * 0.85
+        frame, reference = (
+            replace(v, values=ndimage.gaussian_filter1d(v.values.astype(np.float32), more, axis=2))
+            for v in (scene.frame, scene.reference)
+        )
+        _, curve = seen(replace(scene, frame=frame, reference=reference))
         assert "out of round" not in curve.note
 
 

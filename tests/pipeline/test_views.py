@@ -179,7 +179,9 @@ def test_a_shift_that_no_patient_makes_is_told(across_mm: float, doubted: bool) 
     arm, wire = c_arm(), helix()
     axes = screen_of(arm.matrix, CENTRE, seen(arm, wire)).axes
     view = View(arm.matrix, CENTRE, CENTRE, seen(arm, wire + across_mm * axes[0]), True)
-    frame = SimpleNamespace(ok=True, comparison=True, view=view, simulated=SimpleNamespace(joints_mm=wire))
+    screen = screen_of(arm.matrix, CENTRE, view.points_px)
+    pair = SimpleNamespace(wire_mm=screen.flat(wire) + shift_of(screen, wire, True))
+    frame = SimpleNamespace(ok=True, comparison=pair, view=view, simulated=SimpleNamespace(joints_mm=wire))
     said = _far_shifts(cast(Any, [frame, frame]))
     assert len(said) == doubted
     assert all("wires of 2 frames were shifted by up to 37 mm" in text for text in said), said

@@ -10,7 +10,7 @@ from pipeline.arrays.polyline import at_arc
 from pipeline.compare import Comparison
 from pipeline.compare.config import CompareConfig
 from pipeline.compare.nulls import NULLS, TOLD, Clues, PredictorInputs
-from pipeline.compare.views import Screen, counted, nulls_in, pair_in, screen_of, shift_of, values_in
+from pipeline.compare.views import Screen, counted, nulls_in, pair_in, screen_of, values_in
 from pipeline.load.views import View
 from pipeline.model import Array
 from pipeline.run.stages.known import Context, Frame, Known
@@ -85,11 +85,11 @@ def screen_seen(view: View) -> Screen:
 def _far_shifts(frames: Sequence[Frame]) -> list[str]:
     """A warning of shifts that few patients make: a wire that lies elsewhere would be scored as if it lay there."""
     shifts = [
-        shift_of(screen_seen(frame.view), np.asarray(frame.simulated.joints_mm), frame.view.fitted)
+        float(np.linalg.norm(shifted.wire_mm[0] - screen_seen(frame.view).flat(frame.simulated.joints_mm)[0]))
         for frame in frames
-        if frame.ok and frame.comparison and frame.view is not None and frame.simulated is not None
+        if frame.ok and (shifted := frame.comparison) and frame.view is not None and frame.simulated is not None
     ]
-    far = [mm for mm in map(float, map(np.linalg.norm, shifts)) if mm > FAR_SHIFT_MM]
+    far = [mm for mm in shifts if mm > FAR_SHIFT_MM]
     if not far:
         return []
     return [
