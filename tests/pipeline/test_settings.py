@@ -10,6 +10,7 @@ import pytest
 
 from pipeline.commands import complain
 from pipeline.model import Curve, Lumen
+from pipeline.run import store as store_keys
 from pipeline.run.cache import Store
 from pipeline.run.hashing import file_hash
 from pipeline.run.store import digest, key_of
@@ -119,6 +120,14 @@ def test_a_lumen_and_a_curve_come_back_as_they_were(tmp_path: Path) -> None:
     np.testing.assert_array_equal(again.flagged, curve.flagged)
     assert (again.status, again.note) == (FrameStatus.LENGTH_MISMATCH, "why")
     assert digest(again) == digest(curve)
+
+
+def test_voxels_of_a_lumen_are_hashed_once_for_all_frames(monkeypatch: pytest.MonkeyPatch) -> None:
+    lumen, hashed = Lumen(Grid(np.zeros((3, 4, 5), np.float32))), []
+    once = np.ascontiguousarray
+    monkeypatch.setattr(store_keys.np, "ascontiguousarray", lambda value: hashed.append(value.shape) or once(value))
+    assert len({key_of(np.sin, lumen, frame) for frame in range(3)}) == 3
+    assert hashed.count((3, 4, 5)) == 1
 
 
 @pytest.mark.parametrize("kept", [0, 2, 100, -20, -1])
