@@ -39,19 +39,30 @@ class Scene:
         return wall_of(around(self.lumen.distance, list(self.wires)), self.solver.hull)
 
 
-def replayed(scene: Scene, members: Sequence[Member], arc_mm: Sequence[Array]) -> list[Array]:
-    """The wires of each frame (members, n, 3) at arc lengths (n,) from the entry; NaN for one that is not at rest.
+def replayed(scene: Scene, ensembles: Sequence[Sequence[Member]], arc_mm: Sequence[Array]) -> list[list[Array]]:
+    """For each ensemble the wires of each frame (members, n, 3) at arc lengths (n,) from the entry; NaN for one that is
+    not at rest.
 
-    Members that share a lumen are simulated side by side; one lumen is held at a time.
+    Members that share a lumen are simulated side by side, of whichever ensemble; one lumen is held at a time.
     """
+
+    def surface(place: tuple[int, int]) -> tuple[int, float]:
+        return member(place).lumen, member(place).lumen_mm
+
+    def member(place: tuple[int, int]) -> Member:
+        return ensembles[place[0]][place[1]]
+
     vessel = scene.vessel()
-    found: list[list[Array]] = [[] for _ in arc_mm]
-    for (number, sigma), group in groupby(members, key=lambda member: (member.lumen, member.lumen_mm)):
+    found = [[np.full((len(members), len(arc), 3), np.nan) for arc in arc_mm] for members in ensembles]
+    places = [(i, n) for i, members in enumerate(ensembles) for n in range(len(members))]
+    for (number, sigma), group in groupby(sorted(places, key=surface), key=surface):
         own = list(group)
-        for wires in _together(scene, displaced(vessel, number, sigma, scene.seed), own):
-            for frame, wire, arc in zip(found, wires, arc_mm, strict=True):
-                frame.append(np.full((len(arc), 3), np.nan) if wire is None else at_arc(wire, arc))
-    return [np.array(frame) for frame in found]
+        lumen = displaced(vessel, number, sigma, scene.seed)
+        for (i, n), wires in zip(own, _together(scene, lumen, [member(place) for place in own]), strict=True):
+            for frame, wire, arc in zip(found[i], wires, arc_mm, strict=True):
+                if wire is not None:
+                    frame[n] = at_arc(wire, arc)
+    return found
 
 
 def _together(scene: Scene, vessel: VesselWall, members: Sequence[Member]) -> Iterator[list[Array | None]]:

@@ -167,7 +167,7 @@ def record(run: Context, known: Known, members: int) -> list[dict[str, Any]]:
     kept = []
     work = Work(run, known, [f for f in known.frames if f.ok and f.comparison is not None])
     rng = np.random.default_rng(0)
-    for frame, seen, wires in zip(work.frames, work.seen, work.ensemble(work.sigmas, members), strict=True):
+    for frame, seen, wires in zip(work.frames, work.seen, work.ensembles([(work.sigmas, members)])[0], strict=True):
         budget = frame_budget(wires, seen)
         if budget is None or budget.ratio is None or budget.u_mm is None:
             continue

@@ -54,11 +54,12 @@ def budgeted(run: Context, known: Known) -> Known:
     with run.log.timed("compare"):
         work = Work(run, known, frames)
         try:
-            ensemble = work.ensemble(work.sigmas, settings.members)
+            alike = work.alone() if settings.members_alone else {}
+            ensemble, *each = work.ensembles([(work.sigmas, settings.members), *alike.values()])
             budgets = _with_releases(frames, work.budgets_of(ensemble))
             found = dict(zip(work.numbers, budgets, strict=True))
             rank = work.rank(ensemble, budgets)
-            rows = work.by_source(found) if settings.members_alone else []
+            rows = work.by_source(found, dict(zip(alike, each, strict=True))) if settings.members_alone else []
         except ValueError as error:  # an input was drawn that the solver refuses
             run.log.warnings.append(f"case {run.case.id!r} has no budget: {error}; lower that input's uncertainty")
             return known
@@ -189,19 +190,27 @@ class Work:
         knot = np.nan if frame.curve is None else frame.curve.levels.get("knot_mm", np.nan)
         return TraceSamples(frame.index, seen.arc_mm, seen.nominal_mm, self.trace_mm(frame), knot)
 
-    def ensemble(self, sigmas: Sigmas, count: int) -> list[Array]:
-        """The wires (members, n, 3) of each frame."""
+    def alone(self) -> dict[str, tuple[Sigmas, int]]:
+        """The ensemble of every input by itself, by its name: standard deviations and number of members."""
+        each = {source: alone(self.sigmas, source) for source in SOURCES}
+        count = self.run.config.budget.members_alone
+        return {source: (sigmas, count) for source, sigmas in each.items() if np.any(getattr(sigmas, source))}
+
+    def ensembles(self, draws: Sequence[tuple[Sigmas, int]]) -> list[list[Array]]:
+        """The wires (members, n, 3) of each frame, for each ensemble: its standard deviations and number of members."""
         seed = self.run.config.budget.seed
-        members = drawn(self.nominal, sigmas, count, members_per_lumen(count), seed)
+        members = [drawn(self.nominal, sigmas, count, members_per_lumen(count), seed) for sigmas, count in draws]
         return replayed(self.scene, members, [seen.arc_mm for seen in self.seen])
 
-    def by_source(self, found: Mapping[int, Budget | None]) -> list[dict[str, Any]]:
+    def by_source(
+        self, found: Mapping[int, Budget | None], each: Mapping[str, Sequence[Array]]
+    ) -> list[dict[str, Any]]:
         """Rows of budget.csv: u of every input by itself, of all, of segments and trace, and the error beside them.
 
         Over the frames in which the ensemble has one shape.
         """
         calm = [i for i, n in enumerate(self.numbers) if (b := found[n]) is not None and b.shapes is None]
-        rows = [self._alone(source, calm) for source in SOURCES if np.any(getattr(alone(self.sigmas, source), source))]
+        rows = [self._alone(source, ensemble, calm) for source, ensemble in each.items()]
         pairs = [(b, self.frames[i]) for i in calm if (b := found[self.numbers[i]]) is not None]
         ends = (
             ("inputs", "all of these", [b.input_mm for b, _ in pairs]),
@@ -212,9 +221,8 @@ class Work:
         )
         return rows + [_row(name, said, values) for name, said, values in ends if calm]
 
-    def _alone(self, source: str, calm: Sequence[int]) -> dict[str, Any]:
-        """The row of one input."""
-        ensemble = self.ensemble(alone(self.sigmas, source), self.run.config.budget.members_alone)
+    def _alone(self, source: str, ensemble: Sequence[Array], calm: Sequence[int]) -> dict[str, Any]:
+        """The row of one input by its ensemble."""
         budgets = self.budgets_of(ensemble)
         return _row(source, self.sigmas.said[source], [b.input_mm for i in calm if (b := budgets[i]) is not None])
 
