@@ -11,6 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
+from pipeline.arrays.grids import around
 from pipeline.arrays.polyline import at_arc, samples, smooth, to_length
 from pipeline.compare.branches import branches_of
 from pipeline.compare.config import CompareConfig
@@ -46,12 +47,7 @@ class Clues:
     @cached_property
     def room(self) -> Grid:
         """The signed distance, cropped around the traced wires: for a circle of Willis a tenth of the memory."""
-        grid, points = self.lumen.distance, np.vstack([self.clamp.entry_mm, self.deepest_mm])
-        corners = zip(points.min(axis=0) - ROOM_MM, points.max(axis=0) + ROOM_MM, strict=True)
-        index = grid.to_index(np.array(np.meshgrid(*corners)).reshape(3, -1).T)
-        low = np.clip(np.floor(index.min(axis=0)), 0, np.array(grid.shape) - 1).astype(int)
-        high = np.clip(np.ceil(index.max(axis=0)) + 1, low + 1, grid.shape).astype(int)
-        return grid.crop((low[0], low[1], low[2]), (high[0], high[1], high[2]))
+        return around(self.lumen.distance, np.vstack([self.clamp.entry_mm, self.deepest_mm]), ROOM_MM)
 
     @cached_property
     def centreline(self) -> Array | None:
