@@ -100,10 +100,11 @@ class Clues:
 
 @dataclass(frozen=True, eq=False)
 class PredictorInputs:
-    """What a predictor may see beside the depth.
+    """What a predictor may see besides the depth.
 
-    previous_mm, following_mm : (n, 3) the last trusted trace before the frame, the first after it.     tip_mm : (3,)
-    of the frame itself.     simulated : wires of simulators that lack something, by the predictor's name.
+    previous_mm, following_mm : (n, 3) the last trusted trace before this frame, and the first one after it.
+    tip_mm : (3,) the traced tip of this frame.     simulated : our solver's wires with a part of the input left out, by
+    the name of the predictor.
     """
 
     previous_mm: Array | None = None
@@ -148,7 +149,7 @@ def to_this_tip(clues: Clues, depth_mm: float, seen: PredictorInputs) -> Array |
 
 
 def between(_: Clues, depth_mm: float, seen: PredictorInputs) -> Array | None:
-    """The mean, at equal arc length, of the frames before and after: it saw where the wire went."""
+    """The mean, at equal arc lengths, of the traces before and after this frame: they show where the wire went."""
     sides = [of_path(curve, depth_mm) for curve in (seen.previous_mm, seen.following_mm)]
     arc = samples(depth_mm, 0.5)
     both = [at_arc(curve, arc) for curve in sides if curve is not None]
