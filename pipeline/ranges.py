@@ -1,11 +1,17 @@
-"""Types of the values that users may give; others are refused with the messages of ``pipeline.wording``."""
+"""Types of the values that users may give, and the base of tables of them. Messages are ``pipeline.wording``'s."""
 
 import math
 from functools import partial
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema
 from pydantic_core import PydanticCustomError
+
+
+class Strict(BaseModel):
+    """A table: unknown keys are errors, values are frozen."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
 
 
 def _number(value: Any) -> Any:

@@ -10,6 +10,7 @@ import pandas as pd
 
 from reports.case_files import GOOD, WORST
 from reports.schema import ERRORS, SUMMARY, Column
+from reports.tables import first_row
 
 Grid = dict[str, Any]
 NOTHING = "–"
@@ -149,7 +150,7 @@ def overall(entries: Iterable[Mapping[str, str]], table: pd.DataFrame) -> list[d
     """The numbers over all validation cases, and what their intervals rest on. table : overall.csv, a row or none."""
     if table.empty:
         return []
-    row = {str(name): value for name, value in table.iloc[0].items()}
+    row = first_row(table)
     stand = "insertion stands" if row["insertions"] == 1 else "insertions stand"
     rests = {"value": number(row["insertions"]), "label": f"{stand} behind the intervals ({number(row['interval'])})"}
     return [*cards(entries, row), rests]

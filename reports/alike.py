@@ -13,10 +13,10 @@ _NUMBER = re.compile(r"\d+(\.\d+)?")
 
 
 def alike(rows: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Rows of failures.csv, those of a case that differ in frame, scan and numbers alone as the first of them.
+    """Rows of failures.csv, those of a case that differ in frame, scan and numbers alone merged into the first.
 
-    Each has ``count``, how many it stands for, ``frames``, their numbers as a reader says them, empty for a whole
-    case, and ``files``, those that could not be read where they are several.
+    Each has ``count``, how many rows it stands for, ``frames``, their numbers in words (empty for a whole case), and
+    ``files``, the files that could not be read where there are several.
     """
     groups: dict[tuple[str, ...], list[Mapping[str, Any]]] = {}
     for row in rows:
@@ -54,7 +54,7 @@ def in_words(frames: Sequence[int]) -> str:
 
 
 def of_what(rows: Iterable[Mapping[str, Any]]) -> str:
-    """``2 frames, 1 case`` of what ``alike`` gave: a case without any result is no third frame."""
+    """``2 frames, 1 case`` of the rows that ``alike`` gave; a case without any result is not counted as a frame."""
     counts = {"frame": 0, "case": 0}
     for row in rows:
         counts["frame" if row["frames"] else "case"] += row["count"]

@@ -24,9 +24,9 @@ _MOST_NAMED = 5
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CaseFiles:
-    """What is on disk of one case; absent tables are empty, an absent result.json is an empty mapping.
+    """What is on disk of one case; tables that are absent are empty, and an absent result.json is an empty mapping.
 
-    samples : the compared points; None where they are not read.
+    samples : the compared points, None where they were not read; ``points`` reads them.
     """
 
     folder: Path
@@ -48,7 +48,7 @@ class CaseFiles:
 
     @property
     def points(self) -> pd.DataFrame:
-        """Every compared point; read now where it was not with the rest, since it is by far the largest table."""
+        """Every compared point. By far the largest table: it is read here where ``read_case`` did not."""
         return tables.read_if_there(self.folder / POINTS.file, POINTS) if self.samples is None else self.samples
 
     @property
@@ -58,7 +58,7 @@ class CaseFiles:
 
     @property
     def handed_in(self) -> bool:
-        """Whether the simulated wires are another simulator's: what our solver gave stands in the same folder."""
+        """Whether the simulated wires are another simulator's (the folder then also holds what our solver found)."""
         return any(str(item.get("key", "")).startswith("simulated") for item in self.result.get("inputs", ()))
 
     @property
@@ -68,14 +68,14 @@ class CaseFiles:
 
     @property
     def statistics(self) -> Mapping[str, Any]:
-        """The case's row of summary.csv as its result.json has it, as in the last line on the terminal.
+        """The case's row of summary.csv, as its result.json holds it.
 
-        A case that crashed has this row too, with the number of its frames, and none of the other files.
+        A case that crashed has this row, too, with the number of its frames, though it has none of the other files.
         """
         return dict(self.result.get("summary", {}))
 
     def read_frame(self, frame: int) -> FrameArrays:
-        """Read the arrays of one frame from the disk; kept by nobody. Raises KeyError, naming those that there are."""
+        """Read the arrays of one frame from the disk, each time anew. Raises KeyError, naming the frames there are."""
         if frame not in self.frames:
             there = f"there are {listed([*map(str, self.frames)])}" if self.frames else "there is none"
             raise KeyError(f"case {self.name!r} has no arrays of frame {frame!r}; {there}")
@@ -83,10 +83,10 @@ class CaseFiles:
 
 
 def read_case(folder: Path, points: bool = True, rest: bool = True) -> CaseFiles:
-    """Read a case's folder; raises ValueError, naming the file, where one is damaged.
+    """Read a case's folder. Raises ValueError, naming the file, where one is damaged.
 
-    points, rest : False leaves points.csv.gz unread, by far the largest table; or the times and the scan's geometry.
-    The page of a run needs neither.
+    points : False leaves points.csv.gz unread, by far the largest table.     rest : False leaves out the run times and
+    the geometry of the scan. The page of a run needs neither.
     """
     errors = tables.read_if_there(folder / ERRORS.file, ERRORS)
     samples = tables.read_if_there(folder / POINTS.file, POINTS) if points else None
@@ -96,7 +96,7 @@ def read_case(folder: Path, points: bool = True, rest: bool = True) -> CaseFiles
 
 
 def results_in(out_dir: Path) -> dict[str, dict[str, Any]]:
-    """result.json of every case, empty where there is none, or one that cannot be read, which is said elsewhere."""
+    """result.json by case; empty where there is none, or where it cannot be read, which is said elsewhere."""
     found: dict[str, dict[str, Any]] = {}
     for folder in find_cases(out_dir):
         try:
@@ -107,7 +107,7 @@ def results_in(out_dir: Path) -> dict[str, dict[str, Any]]:
 
 
 def find_cases(out_dir: Path) -> list[Path]:
-    """Folders of the cases of a run, by name; those that no run into the folder names belong to another study."""
+    """Folders of the cases of a run, by name, less those of another study: no run into the folder names these."""
     return _folders(out_dir, named=True)
 
 
@@ -117,13 +117,13 @@ def left_over(out_dir: Path) -> list[Path]:
 
 
 def left_over_sentence(out_dir: Path) -> str:
-    """What is not counted, and how to be rid of it; empty where everything is."""
+    """Which cases are not counted since no run names them any more, and how to remove them; empty if there are none."""
     names = listed([folder.name for folder in left_over(out_dir)])
     return f"not counted, since no manifest of this folder names them any more: {names}" * bool(names)
 
 
 def not_run_sentence(out_dir: Path) -> str:
-    """Cases that the runs into a folder name and that have no result in it, as those of a shard that was not merged."""
+    """Cases that runs into a folder name, but that have no result in it, such as those of a shard not merged yet."""
     names = listed(not_run(out_dir))
     return f"named by the manifest and without a result here: {names}" * bool(names)
 
@@ -134,9 +134,10 @@ def not_run(out_dir: Path) -> list[str]:
 
 
 def amiss(folder: Path) -> str:
-    """Which file of a finished case is missing or of another size than its ledger.json says; empty where none is.
+    """Which file of a finished case is missing, or has another size than its ledger.json says; empty if none.
 
-    Pages and views are drawn again and not asked for; contents are not read. A case that crashed has no ledger.
+    Pages and views are left out, since they can be drawn again. Contents are not read. A case that crashed has no
+    ledger.
     """
     if not (folder / "ledger.json").exists():
         return ""
@@ -193,7 +194,7 @@ def counted(count: int, noun: str) -> str:
 
 
 def not_reached(out_dir: Path) -> str:
-    """Why nothing is scored where every run into a folder was to end before frames are compared; else empty."""
+    """Why nothing is scored, where every run into a folder was to end before frames are compared; else empty."""
     ends = [str(run.get("until", "")) for run in runs_in(out_dir)]
     early = bool(ends) and all(end in ("load", "segment", "trace", "simulate") for end in ends)
     return f"Nothing is scored: the run was to end before frames are compared (--until {ends[0]})." if early else ""

@@ -75,7 +75,7 @@ def _drawn(case: CaseFiles, embed: bool, each: Each) -> dict[str, Any]:
 
 
 def case_failures(case: CaseFiles) -> list[dict[str, Any]]:
-    """What went wrong: frame by frame as result.json says, what errors.csv says beyond that, or the whole case."""
+    """What went wrong in a case: by frame, as result.json and (beyond that) errors.csv say, or as a whole."""
     whole = [dict(row) for row in case.result.get("failures", ()) if row.get("frame") is None]
     if whole:  # a lumen that is not found fails every frame alike: said once, as in failures.csv
         return [dict.fromkeys(FAILURES.names, "") | {"case": case.name} | row for row in whole]
@@ -115,7 +115,7 @@ def _case_verdict(case: CaseFiles, copied: str) -> str:
 
 
 def scored_or_ok(cases: Sequence[CaseFiles]) -> str:
-    """What a frame with a result is called: not all are scored where parameters are learnt or nothing is compared."""
+    """The word for a frame with a result: "scored" is wrong where parameters are learnt, or nothing is compared."""
     results = [case.result for case in cases]
     learnt = any(result.get("role") == "calibration" or result.get("status") == "simulated" for result in results)
     return "ok" if learnt else "scored"

@@ -32,11 +32,12 @@ Row = tuple[Any, ...]
 
 @dataclass(frozen=True, eq=False)
 class Difference:
-    """rows: (simulator, of scores,) case, frame, column, before, after, change, allowed, verdict.
+    """Two runs compared. rows : (simulator, of scores,) case, frame, column, before, after, change, allowed, verdict.
 
-    verdict : same, within, better, regression, moved (a value that has no better side, by more than allowed, or a
-    column that the second run has in no frame), or new (only the second run has it; of a frame, ``after`` is its
-    status).     empty : cases of which the first run has no number to hold against.
+    verdict : "same"; "within" what is allowed; "better"; "regression"; "moved", a value of which neither direction is
+    better that changed by more than is allowed, or a column that the second run has in no frame; "new", what only the
+    second run has (of a frame, ``after`` is its status).     empty : cases of which the first run has no number to
+    compare with.
     """
 
     rows: pd.DataFrame
@@ -44,40 +45,35 @@ class Difference:
 
     @property
     def regressions(self) -> pd.DataFrame:
-        """The rows that became worse, the worst first: what is missing, then by how many times what is allowed."""
+        """The rows that became worse, the worst first: what is missing, then by change over allowed change."""
         rows = self.rows[self.rows["verdict"] == "regression"]
         times = (rows["change"].abs() / rows["allowed"]).fillna(math.inf)
         return rows.loc[times.sort_values(ascending=False, kind="stable").index]
 
     @property
     def lacking(self) -> list[str]:
-        """The columns that the first run has values of, and the second has in no frame."""
+        """Columns of which the first run has values and the second has none, in any frame."""
         return list(dict.fromkeys(self.rows["column"][self.rows["after"].eq(_LACKING)]))
 
     @property
     def judged(self) -> bool:
-        """Whether a value that may become worse was held against another: equal statuses say nothing of errors."""
+        """Whether any value that can become worse was compared. Equal statuses alone say nothing about errors."""
         directed = self.rows["column"].isin([column.name for column in ERRORS if column.better])
         return bool((directed & self.rows["change"].notna()).any())
 
     @property
     def moved(self) -> pd.DataFrame:
-        """The rows that are neither worse nor better, but another thing than before."""
+        """The rows that changed by more than is allowed and are neither better nor worse."""
         return self.rows[self.rows["verdict"] == "moved"]
 
     @property
-    def closing(self) -> pd.DataFrame:
-        """The rows for which a gate must close, in their order."""
-        return self.rows[self.rows["verdict"].isin(CLOSING)]
-
-    @property
     def new(self) -> pd.DataFrame:
-        """The frames, and cases without any, that only the second run has: they are held against nothing."""
+        """Frames, and cases without frames, that only the second run has: nothing to compare them with."""
         return self.rows[(self.rows["verdict"] == "new") & self.rows["column"].isin(["frame", "case"])]
 
     @property
     def by_column(self) -> pd.DataFrame:
-        """Per column: pairs, median change, worst change (in the bad direction, or either), regressions, moved."""
+        """By column: pairs, median change, worst change (largest, if neither side is better), regressions, moved."""
         paired = self.rows[self.rows["change"].notna()]
         worse = paired["change"] * paired["column"].map(_sign)
         marks = {name: paired["verdict"] == verdict for name, verdict in (("bad", "regression"), ("moved", "moved"))}
@@ -137,11 +133,11 @@ class Difference:
 def diff_folders(
     out_a: Path, out_b: Path, tolerance: Mapping[str, float], damaged: Mapping[str, str] = MappingProxyType({})
 ) -> Difference:
-    """Compare the errors.csv of every case of two output folders, ``out_a`` being the one to hold against.
+    """Compare errors.csv of every case of two output folders; ``out_a`` is the reference.
 
-    A case without errors.csv has no frames. damaged : cases of ``out_b`` whose results cannot be relied on, and why:
-    each is a regression. Raises ValueError where ``out_a`` has no case, or no number: a gate without a reference would
-    always be open.
+    A case without errors.csv counts as one without frames. damaged : cases of ``out_b`` whose files cannot be relied
+    on, and why; each is a regression. Raises ValueError where ``out_a`` has no case or no number, since a gate without
+    a reference would always be open.
     """
     before, after = (
         {
@@ -161,7 +157,7 @@ def diff_folders(
 
 
 def not_judged(tolerance: Mapping[str, float]) -> str:
-    """What the last line adds where the tolerance names no error of the simulated wire; empty where it does."""
+    """A sentence where the tolerance names no error of the simulated wire, so that none is compared; else empty."""
     names = [name for name in tolerance if name != RATIO]
     lengths = {name for name in names if ERRORS[name].unit == "mm" and ERRORS[name].better == "low"}
     if any(name not in BEFORE_COMPARE and not name.startswith("u_") for name in lengths):  # u_: what is not known
@@ -184,7 +180,10 @@ def diff_tables(
     tolerance: Mapping[str, float],
     damaged: Mapping[str, str] = MappingProxyType({}),
 ) -> Difference:
-    """Compare errors tables by case. A missing or damaged case, a missing frame, and one that fails now regress."""
+    """Compare tables of errors by case.
+
+    Regressions, too, are a missing or damaged case, a missing frame, and a frame that fails only in the second run.
+    """
     rows: list[Row] = []
     tolerance = {name: allowed for name, allowed in tolerance.items() if name != RATIO}
     for case in dict.fromkeys([*before, *after, *damaged]):

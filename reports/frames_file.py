@@ -46,7 +46,10 @@ class ScanCrop:
 
 
 class Straightened(NamedTuple):
-    """The scan along a wire: k planes (k, m, m) and how far apart, as their samples; normal (3,): see above."""
+    """A scan along a wire: k planes (k, m, m) across it, how far apart these are, and the samples in them, mm.
+
+    normal : (3,) the first axis of the planes, see above.
+    """
 
     values: NDArray[np.uint8]
     along_mm: float
@@ -58,12 +61,15 @@ class Straightened(NamedTuple):
 class FrameArrays:
     """Arrays of one frame; what does not apply is None.
 
-    traced_mm (n, 3), simulated_mm (k, 3), truth_mm (t, 3): LPS mm, entry to tip.     trace_sigma_mm (n,).
-    trace_flags (n,): 1 bridged, streaky or in contact, 2 nearly parallel to the plane of rotation, 3 both, 0 neither.
-    seen_in_view_mm (n, 2), simulated_in_view_mm (k, 2): the real and the simulated wire in an X-ray projection, mm on
-    the plane through the isocentre, whose origin it is.
-    error_mm and arc_mm: one value per compared arc sample.     contact_force_N: (k,) or (k, 3) at the joints.
-    median_mm (n, 3), covariance_mm2 (n, 3, 3): of the wires of the ensemble, at such samples.
+    traced_mm (n, 3), simulated_mm (k, 3), truth_mm (t, 3) : LPS mm, from the entry to the tip.
+    trace_sigma_mm (n,) : standard deviation of the traced points.     trace_flags (n,) : 1 where a gap is bridged, the
+    scan is streaky or strands are in contact, 2 where the wire is nearly parallel to the plane of rotation, 3 both, 0
+    neither.
+    seen_in_view_mm (n, 2), simulated_in_view_mm (k, 2) : the real and the simulated wire in an X-ray projection, mm
+    from the isocentre in the plane through it.
+    error_mm, arc_mm : one value for each compared sample of the arc.     contact_force_N : (k,) or (k, 3) at the
+    joints.
+    median_mm (n, 3), covariance_mm2 (n, 3, 3) : of the ensemble's wires, at samples like those.
     """
 
     frame: int
@@ -156,7 +162,7 @@ def read_frame(path: Path, frame: int) -> FrameArrays:
 
 
 def read_arrays(path: Path, *names: str) -> dict[int, dict[str, Array]]:
-    """Of every frame these fields of ``FrameArrays`` alone, where it has them."""
+    """Some fields of ``FrameArrays`` of every frame, as far as it has them."""
     with h5py.File(path, "r") as file:
         return {
             int(number): {name: np.array(group[name], float) for name in names if name in group}

@@ -22,24 +22,24 @@ _NIGHT = "0.52 -0.64 -0.48 0 0.69  -0.48 0.36 -0.48 0 0.69  -0.48 -0.64 0.52 0 0
 
 
 class Each(Protocol):
-    """Does a work for every number below a count: here one after the other, or shared out among processes."""
+    """Does ``work(i)`` for every i below ``count``, in turn or shared among processes, and returns the results."""
 
     def __call__(self, work: Callable[[int], R], count: int) -> list[R]:
         """Their results, in order; none of them may be None."""
 
 
 def one_by_one(work: Callable[[int], R], count: int) -> list[R]:
-    """One after the other."""
+    """Do the work for each number in turn, in this process."""
     return [work(number) for number in range(count)]
 
 
 def longest(entries: Sequence[Mapping[str, Any]]) -> list[int]:
-    """Numbers, from 1, of the figures that take as long as many others."""
+    """The numbers, from 1, of the figures of which each takes as long as many others."""
     return [number for number, entry in enumerate(entries, 1) if entry["figure"] in LONGEST]
 
 
 def begun_first(first: Sequence[int], work: Callable[[int], R], count: int, each: Each) -> list[R]:
-    """The results in order, some of the works begun before all others: late, they would keep one core busy alone."""
+    """Results in order, though some works are begun first: begun last, one would keep a core busy alone."""
     order = sorted(range(count), key=lambda number: number not in first)
     done = dict(zip(order, each(lambda turn: work(order[turn]), count), strict=True))
     return [done[number] for number in range(count)]
@@ -48,9 +48,9 @@ def begun_first(first: Sequence[int], work: Callable[[int], R], count: int, each
 def draw_sections(page: str, data: Any, folder: Path, embed: bool, each: Each = one_by_one) -> list[dict[str, Any]]:
     """Draw every declared figure of a page into ``folder``/figures; a figure without data is left out.
 
-    Each is described by its entry in sections.toml, by ``source`` and ``numbers``, which are links or the files
-    themselves as data URIs, and by its width and height in pixels. A picture left from an earlier run whose data is
-    gone is removed, so that nobody finds it in the folder.
+    Each is described by its entry in sections.toml, by ``source`` and ``numbers``, which are links or (with ``embed``)
+    the files themselves as data URIs, and by its width and height in pixels. The picture of a figure that has no data
+    any more is removed.
     """
     entries = declared(page)
     return list(filter(None, each(lambda i: section(page, entries[i], data, folder, embed), len(entries))))
@@ -74,14 +74,14 @@ def section(page: str, entry: Mapping[str, Any], data: Any, folder: Path, embed:
 
 
 def write_page(template: str, page: Mapping[str, Any], path: Path) -> Path:
-    """Render a template of this package with everything escaped; a name it misses is an error, not a gap."""
+    """Fill in a template of this package, everything escaped, and write it. A name that it misses is an error."""
     write_text(path, _templates().get_template(template).render(page))
     return path
 
 
 @cache
 def compiled() -> None:
-    """Compile the templates of a run's pages, which takes as long as filling them in: beside the drawing, say."""
+    """Compile the templates of a run's pages ahead, beside other work: that takes as long as filling them in."""
     for name in ("case.html.j2", "index.html.j2", "macros.html.j2", "viewer.html.j2", "base.html.j2"):
         _templates().get_template(name)
 

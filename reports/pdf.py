@@ -21,7 +21,7 @@ from reports.pdf_page import RIGHT, WIDE, Figured, Page
 from reports.records import read_json
 from reports.run_page import readable_cases, run_files
 from reports.schema import FAILURES, OVERALL_FILE, SUMMARY
-from reports.tables import read_if_there
+from reports.tables import first_row, in_texts, read_if_there
 from reports.verdict import Doubt, unscored, verdict
 from reports.what_next import next_command, typed, worst_frames
 from reports.worse import worse_sentence
@@ -63,7 +63,7 @@ def _first(out_dir: Path, summary: pd.DataFrame, whole: pd.DataFrame) -> Page:
     failures = read_if_there(out_dir / FAILURES.file, FAILURES)
     page = Page("Guide-wire validation")
     ok, planned = int(summary["frames_ok"].sum()), int(summary["frames"].sum())
-    row = {str(name): value for name, value in whole.iloc[0].items()} if len(whole) else {}
+    row = first_row(whole)
     cases = zip(summary["role"], summary["status"], strict=True)
     results = results_in(out_dir)
     simulator = next((name for one in results.values() if (name := str(one.get("simulator", "")))), "")
@@ -96,8 +96,7 @@ def _first(out_dir: Path, summary: pd.DataFrame, whole: pd.DataFrame) -> Page:
 
 def _failures(page: Page, failures: pd.DataFrame, out_dir: Path) -> None:
     """What failed, alike frames once, and the next command. failures : of failures.csv, at least a row."""
-    blank = failures.astype(object).where(failures.notna(), "")
-    rows = alike({str(k): v for k, v in row.items()} for row in blank.to_dict("records"))
+    rows = alike(in_texts(failures))
     page.text(f"Failures: {of_what(rows)}", size=11, weight="bold", colour=colours.BAD)
     for row in rows[:_MOST_FAILURES]:
         case = ": ".join(filter(None, (row["simulator"], row["case"])))

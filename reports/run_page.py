@@ -33,8 +33,8 @@ from reports.page import Each, draw_sections, one_by_one, write_page
 from reports.records import read_json
 from reports.schema import FAILURES, OVERALL_FILE, SIMULATORS, SUMMARY, SWEEP
 from reports.sweep import silent_points
-from reports.tables import read_if_there
-from reports.verdict import Doubt, badge, of_these_alone, unscored, verdict
+from reports.tables import first_row, in_texts, read_if_there
+from reports.verdict import Doubt, badge, first_that_holds, of_these_alone, unscored, verdict
 from reports.what_next import next_command, typed, worst_frames
 from reports.worse import worse_cases, worse_sentence
 
@@ -49,16 +49,16 @@ def render_index(out_dir: Path, embed: bool = False, each: Each = one_by_one) ->
     links = {name: f"cases/{quote(p.parent.name)}/{p.name}" for name, p in pages.items() if p.exists()}
     failures += _run_failures(out_dir, cases, links)
     runs = {path.name: read_json(path) for path in sorted(out_dir.glob("run*.json"))}
-    infos = list(runs.values())
-    row = dict(whole.iloc[0]) if len(whole) else {}
+    infos, row = list(runs.values()), first_row(whole)
     uncounted = damaged | set(summary["case"][summary["role"] == "calibration"])
     missing, doubts, gates = not_run(out_dir), doubted(out_dir), gates_in(out_dir)
     mixed, cases_said = why_not_pooled(out_dir), zip(summary["role"], summary["status"], strict=True)
     why_none = mixed or unscored(cases_said) or not_reached(out_dir)
-    status = _status(not (cases and all(map(_of_another, failures))), missing, mixed, gates["closed"])
+    failed = not (cases and all(map(_of_another, failures)))
+    why = {"failures": failed, "cases missing": missing, "not pooled": mixed, "gate closed": gates["closed"]}
     page = {
         **_headline(cases, missing, damaged),
-        **_judged(cases, doubts, status, row, why_none),
+        **_judged(cases, doubts, first_that_holds(why), row, why_none),
         **_worse_cases(summary, links),
         "worst": worst_frames({n: t for n, t in errors.items() if n not in uncounted}, links),
         # of several shards' commands none is the one of the run
@@ -96,8 +96,7 @@ def _is_tall(section: Mapping[str, Any]) -> bool:
 def _run_failures(out_dir: Path, cases: list[CaseFiles], links: dict[str, str]) -> list[dict[str, Any]]:
     """Rows of failures.csv, and what it does not know of: cases without result.json; then those of other simulators,
     whose pages lie beside their logs."""
-    table = read_if_there(out_dir / FAILURES.file, FAILURES)
-    rows: list[dict[Any, Any]] = table.astype(object).where(table.notna(), "").to_dict("records")
+    rows = in_texts(read_if_there(out_dir / FAILURES.file, FAILURES))
     beside = [row for row in rows if _of_another(row)]
     # the page finds out itself what it cannot read
     own = [row for row in rows if row not in beside and row["status"] != "damaged"]
@@ -116,7 +115,7 @@ def _of_another(failure: Mapping[Any, Any]) -> bool:
 
 
 def readable_cases(out_dir: Path) -> tuple[list[CaseFiles], list[dict[str, Any]]]:
-    """Every case that can be read, and a failure for each that has a bad file, or lost one: it must not hide others."""
+    """Every case that can be read, and a failure for each with a bad or missing file: it must not hide the others."""
     cases, broken = [], []
     for folder in find_cases(out_dir):
         wrong = amiss(folder)
@@ -130,12 +129,6 @@ def readable_cases(out_dir: Path) -> tuple[list[CaseFiles], list[dict[str, Any]]
             row |= {"status": "damaged", "sentence": "a result file cannot be read", "message": message}
             broken.append(row)
     return cases, broken
-
-
-def _status(failed: bool, missing: Sequence[str], mixed: str, closed: Sequence[str]) -> str:
-    """The worst that can be said of a run in a word or two."""
-    words = {"failures": failed, "cases missing": missing, "not pooled": mixed, "gate closed": closed}
-    return next((word for word, so in words.items() if so), "ok")
 
 
 def _worse_cases(summary: pd.DataFrame, links: Mapping[str, str]) -> dict[str, Any]:

@@ -15,8 +15,8 @@ from reports.gates import gates_in
 from reports.origin import why_not_pooled
 from reports.page import draw_sections, write_page
 from reports.schema import OURS, OVERALL_FILE, SIMULATORS, SUMMARY, WHERE, Column
-from reports.tables import read_if_there
-from reports.verdict import NEVER_NEAREST, Doubt, badge, tips_off, verdict
+from reports.tables import first_row, read_if_there
+from reports.verdict import NEVER_NEAREST, Doubt, badge, first_that_holds, tips_off, verdict
 
 PAGE = "simulators.html"
 _MOST_WARNINGS = 5
@@ -72,8 +72,7 @@ def _said(alone: Mapping[Any, Any], folder: Path, lines: Sequence[str], copied: 
     is over frames that count for all.     copied : that its wires were made from the traces.     few : it has too few
     frames to be judged beside the others.
     """
-    whole = read_if_there(folder / OVERALL_FILE, SUMMARY)
-    row = {str(name): value for name, value in whole.iloc[0].items()} if len(whole) else {}
+    row = first_row(read_if_there(folder / OVERALL_FILE, SUMMARY))
     row |= {name: value for name, value in alone.items() if "strongest" in name}
     if few:  # nor has it a skill against the centreline beside those of the others
         row.pop("skill", None)
@@ -81,7 +80,7 @@ def _said(alone: Mapping[Any, Any], folder: Path, lines: Sequence[str], copied: 
     failed = f"On {good} of {alone['frames']} frames: " if good < alone["frames"] else ""
     closed = gates_in(folder)["closed"]
     why = {"cases missing": missing, "frames failed": failed, "not pooled": mixed, "gate closed": closed}
-    status = next((word for word, so in why.items() if so), "ok")
+    status = first_that_holds(why)
     doubt = Doubt("" if missing or failed or mixed else copied, twins(doubted(folder)))
     said = verdict(row, alone["simulator"], doubt)
     lines = [line for line in lines if line != doubt.copied]

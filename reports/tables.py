@@ -113,6 +113,17 @@ def read_if_there(path: Path | None, table: Table) -> pd.DataFrame:
     return _EMPTY[table.names].copy()
 
 
+def first_row(content: pd.DataFrame) -> dict[str, Any]:
+    """The first row by the names of its columns; empty where there is none."""
+    return {str(name): value for name, value in content.iloc[0].items()} if len(content) else {}
+
+
+def in_texts(content: pd.DataFrame) -> list[dict[str, Any]]:
+    """The rows by the names of their columns, an empty text where a field is empty."""
+    blank = content.astype(object).where(content.notna(), "")
+    return [{str(name): value for name, value in row.items()} for row in blank.to_dict("records")]
+
+
 def has(content: pd.DataFrame, *columns: str) -> bool:
     """Say whether any of the columns has a value."""
     return any(content[column].notna().any() for column in columns if column in content)

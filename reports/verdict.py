@@ -11,10 +11,10 @@ _WIDE = "wide: "  # how the note on an interval over few insertions begins
 
 
 class Doubt(NamedTuple):
-    """Why numbers do not mean what they say: the warning, empty without one.
+    """Why the numbers may not mean what they say: a warning each, empty if there is none.
 
-    copied : the wires were made from the traces; nothing else counts then.     twins : insertions look like one that
-    was scanned again, and count as several.
+    copied : the wires were made from the traces, so no number counts.     twins : some insertions look like one that
+    was scanned twice, but count as several.
     """
 
     copied: str = ""
@@ -25,7 +25,7 @@ NO_DOUBT = Doubt()
 
 
 def verdict(statistics: Mapping[str, Any], simulator: str = "", doubt: Doubt = NO_DOUBT) -> str:
-    """How far the simulated wire is from the traced one, and whether that beats what anybody would have guessed.
+    """How far the simulated wire is from the traced one, and whether that is better than the best guess, in sentences.
 
     statistics : a row of summary.csv or overall.csv.     simulator : whose wire it is, where there are several.
     """
@@ -101,7 +101,7 @@ WORSE_BELOW = -0.1
 
 
 def remarks(statistics: Mapping[str, Any], simulator: str = "") -> list[str]:
-    """What rms_mm and skill alone do not tell, a sentence each. simulator : as in :func:`verdict`."""
+    """What rms_mm and skill alone do not show, one sentence each. simulator : as in :func:`verdict`."""
     return [text for text in (tips_off(statistics), _unknown_roll(statistics, simulator)) if text]
 
 
@@ -119,7 +119,7 @@ def _unknown_roll(statistics: Mapping[str, Any], simulator: str) -> str:
 
 
 def tips_off(statistics: Mapping[str, Any]) -> str:
-    """What rms_mm does not see, as it goes from the simulated wire to the traced one: a wire that ends elsewhere."""
+    """That the tips lie apart, which rms_mm misses: its distances go from the simulated wire to the traced one."""
     tip, rms, along = (_number(statistics.get(key)) for key in ("tip_median_mm", "rms_mm", "tip_along_median_mm"))
     unseen = "rms_mm does not see that, judge by tip_median_mm, and by back_rms_mm of errors.csv."
     if not tip > max(TIPS_OFF_MM, TIPS_OFF_RATIO * rms):
@@ -133,10 +133,10 @@ def tips_off(statistics: Mapping[str, Any]) -> str:
 
 
 def standing(statistics: Mapping[str, Any]) -> str:
-    """WORSE, NO_BETTER, TIPS_OFF or NOT_SHOWN; empty where the wire beats the strongest predictor, or no more is known.
+    """WORSE, NO_BETTER, TIPS_OFF or NOT_SHOWN; empty where the wire beats the strongest predictor, or nothing is known.
 
-    WORSE where the whole interval of the skill is below zero; without an interval where the skill is below WORSE_BELOW.
-    Where the interval is on both sides nothing is shown, whatever the skill.
+    WORSE where the whole interval of the skill is below zero or, without an interval, where the skill is below
+    WORSE_BELOW. NOT_SHOWN where zero lies in the interval, whatever the skill.
     """
     _, skill, least, most = _skill(statistics)
     if skill <= 0.0:
@@ -145,8 +145,13 @@ def standing(statistics: Mapping[str, Any]) -> str:
     return TIPS_OFF if tips_off(statistics) else NOT_SHOWN if least <= 0.0 else ""
 
 
+def first_that_holds(words: Mapping[str, Any]) -> str:
+    """The status of a run: of words for what may be wrong with it, the worst first, the first that is; else ok."""
+    return next((word for word, so in words.items() if so), "ok")
+
+
 def badge(status: str, good: bool, statistics: Mapping[str, Any], doubt: Doubt = NO_DOUBT) -> dict[str, str]:
-    """The word beside a heading and its look: good, poor or bad. What ran well but is no better than a guess is poor.
+    """The word beside a heading, and its look: good, poor (no better than a guess, though nothing failed) or bad.
 
     statistics : a row of summary.csv or overall.csv, empty where nothing was scored.
     """
@@ -165,7 +170,7 @@ OF_CALIBRATION = (
 
 
 def unscored(cases: Iterable[tuple[str, str]]) -> str:
-    """Why no error stands over a whole run, from role and status of its cases; empty where a case was to be scored."""
+    """Why a run has no error over all its cases; empty where one was to be scored. cases : role and status of each."""
     known = [(str(role), str(status)) for role, status in cases]
     learnt = [role == "calibration" for role, _ in known]
     if known and all(learnt):
@@ -195,7 +200,7 @@ def _skill(statistics: Mapping[str, Any]) -> tuple[str, float, float, float]:
 
 
 def in_short(statistics: Mapping[str, Any]) -> str:
-    """The number to quote for a line of text, after what it means where the wire does not beat the predictor."""
+    """The number to quote in one line of text; where the wire does not beat the predictor, that comes first."""
     _, skill, least, _ = _skill(statistics)
     if isnan(skill):
         return ""
@@ -239,7 +244,7 @@ def _few_insertions(statistics: Mapping[str, Any]) -> str:
 
 
 def of_these_alone(statistics: Mapping[str, Any]) -> str:
-    """That a skill without an interval speaks of the insertions that there are: with three it may not be shown."""
+    """That a skill without an interval is only about the insertions at hand: three of them are too few to say more."""
     withheld = "withheld" in str(statistics.get("interval")) and _skill(statistics)[1] > 0.0
     return "The skill is of these insertions alone: three at least would tell what others give." * withheld
 

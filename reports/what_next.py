@@ -18,9 +18,9 @@ _NOT_AGAIN = "--only", "--case-timeout", "--case-memory"
 
 
 def worst_frames(tables: Mapping[str, pd.DataFrame], links: Mapping[str, str]) -> list[dict[str, Any]]:
-    """The frames that are scored and worst, worst first: case, frame, text and link of each.
+    """The scored frames with the largest errors, worst first: case, frame, text and link of each.
 
-    tables : errors.csv by case.     links : of the cases' pages.
+    tables : errors.csv by case.     links : those of the cases' pages.
     """
     good = {case: table[table["status"].eq("ok") & table[WORST].notna()] for case, table in tables.items()}
     rows = [(float(v), case, int(n)) for case, t in good.items() for n, v in zip(t["frame"], t[WORST], strict=True)]
@@ -32,9 +32,9 @@ def worst_frames(tables: Mapping[str, pd.DataFrame], links: Mapping[str, str]) -
 
 
 def warned(out_dir: Path) -> list[str]:
-    """What is doubtful among the cases of a run, and what was warned of in each, a line each text, of these a few.
+    """What is doubtful among the cases of a run, and a few of the warnings in each, one line for each text.
 
-    Once for all cases that say it: on a screen of 30 lines the failures above are to stay in sight.
+    A text that several cases share is said once: on a screen of 30 lines the failures above should stay in sight.
     """
     lines = [f"warning: {text}" for text in said_by_cases(results_in(out_dir), "warnings")]
     rest = len(lines) - _MANY
@@ -49,10 +49,10 @@ def typed(folder: Path) -> Sequence[str]:
 
 
 def next_command(cases: Iterable[str], typed: Sequence[str] = ()) -> str:
-    """The command that computes these cases again, also after what the message says was done to the manifest.
+    """The command that computes these cases again once what the messages say has been done.
 
-    typed : the command of this run, where it is known; MANIFEST and OUT stand where it is not. More than a few cases
-    are not named: what is finished is kept anyway, and by ``score``, which runs all, without being asked.
+    typed : the command of this run; where it is not known, MANIFEST and OUT stand for its arguments. More than a few
+    cases are not named, since what is finished is kept anyway; ``score`` names none and keeps it without being asked.
     """
     if list(typed[:2]) == ["wireval", "score"]:
         return shlex.join(word for word in typed if word != "--fresh")

@@ -10,17 +10,14 @@ from reports.verdict import WORSE, standing
 
 
 def worse_cases(rows: Iterable[Mapping[Any, Any]]) -> list[str]:
-    """Cases that are scored and whose wire is worse than a guess, which a number over all cases hides.
-
-    rows : of summary.csv.
-    """
+    """Cases whose wire is worse than a guess, which a number over all cases does not show. rows : of summary.csv."""
     return [str(row["case"]) for row in _scored(rows) if standing(row) == WORSE]
 
 
 def worse_sentence(rows: Sequence[Mapping[Any, Any]]) -> str:
-    """These cases in a sentence, and one that lies far off beside the others.
+    """The cases worse than a guess, and the one with far larger errors than the others; empty without any.
 
-    Empty where there are none, or one case alone, of which all else speaks.
+    Empty, too, for one case alone, of which everything else on the page speaks.
     """
     worse, scored = worse_cases(rows), len(_scored(rows))
     are = "is" if len(worse) == 1 else "are"

@@ -20,10 +20,11 @@ linear there, nor is the energy stored. From an EI of 1 to one of 1000 the sum o
 class Catheter:
     """A straight tube over the wire, clamped with it at the entry.
 
-    bending_stiffness_N_mm2 : EI of the tube alone, 0 or more.     radius_mm : of its outer hull, more than the wire's.
-    The pair bends by the sum of both EI; at rest it has the wire's curvature times its share of that sum. The two slide
-    and turn on each other freely: friction of the vessel on the catheter is borne by the catheter's hand, and not
-    modelled; the wire rubs on the vessel beyond the catheter's tip only.
+    bending_stiffness_N_mm2 : EI of the tube alone, 0 or more.     radius_mm : outer radius, more than the wire's.
+    Where the tube covers the wire, the two bend as one beam whose EI is the sum of both, and whose curvature at rest is
+    the wire's times the wire's share of that sum. They slide and turn on each other without friction. Friction between
+    vessel and catheter is borne by the hand that holds the catheter, and is not modelled; the wire rubs on the vessel
+    only beyond the catheter's tip.
     """
 
     bending_stiffness_N_mm2: float

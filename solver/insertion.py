@@ -39,22 +39,26 @@ ONE_AT_A_TIME = "finish one call before the next, or go on with insertion.clone(
 
 
 class Insertion:
-    """A wire, clamped at the entry and tangent to entry_direction, pushed into a lumen step after step.
+    """A wire that is held at the entry in a given direction and pushed into a lumen in small steps.
 
-    entry_mm : (3,) LPS mm.     entry_direction, material_axis : (3,) LPS, any length; at roll 0 material axis 1
-    points along material_axis (default: the world axis least aligned with entry_direction, made orthogonal).
-    method : "newton" or "closed_form".     initial : "slide" (material moves along the wire's own curve) or
-    "translate" (the paper's section 4.1).     step_mm, roll_step_deg : longest step; with friction on the wall, or
-    on a shaft that twists, no step is longer than 0.1 mm and no roll than 1 degree.
-    finest_mm : a step whose change of energy does not match the hand's work is repeated in shorter ones, down to this
-    length; step_mm or more: never.
+    entry_mm : (3,) LPS mm, where the wire is clamped.     entry_direction : (3,) LPS, any length; the wire leaves the
+    entry along it.     material_axis : (3,) LPS, where material axis 1 points at roll 0, made orthogonal to
+    entry_direction; the default is the world axis that is least aligned with entry_direction.
+    method : "newton" or "closed_form".     initial : the shape from which a step's relaxation starts: "slide" moves the
+    material along the wire's own curve, "translate" is the paper's section 4.1.
+    step_mm, roll_step_deg : the longest step. With friction on the wall, or on a shaft that twists, no step is longer
+    than 0.1 mm and no roll larger than 1 degree.
+    finest_mm : where the change of energy in a step does not match the work of the hand, the step is repeated in
+    shorter ones, down to this length. With step_mm or more no step is repeated.
     tolerance, max_iterations, quadrature : see ``solver.relax.Settings``.     max_joints : longest wire accepted.
-    tip_load_N : (3,) dead force on the tip.     down : (3,) LPS, where the wire's weight pulls.
-    catheter : over the wire, see ``to_depths``.
-    shaft_mm : length of wire between the hand and the entry, the same at every depth: it twists (stiffness GJ), so the
-    tip lags behind the hand.     shaft_friction_N : force at its surface that it takes to slide or turn that shaft.
-    Raises ValueError for arguments that cannot be used; whatever happens on the way is a Status. An insertion has one
-    state and moves one way at a time (see ``to_depths``): ``clone`` makes branches, ``pickle`` checkpoints.
+    tip_load_N : (3,) a force on the tip that keeps its direction.     down : (3,) LPS, the direction of gravity; needed
+    if the wire has a weight.     catheter : a tube over the wire, see ``to_depths``.
+    shaft_mm : length of wire between the hand and the entry, the same at every depth. It twists with stiffness GJ, so
+    the tip lags behind the hand.     shaft_friction_N : force at its surface that it takes to slide or turn that shaft.
+
+    Raises ValueError for arguments that cannot be used. What goes wrong while the wire is pushed is a ``Status`` of the
+    solution. An insertion has one state and does one thing at a time (see ``to_depths``): use ``clone`` to try several
+    ways from one state, and ``pickle`` to save a state.
     """
 
     def __init__(
@@ -126,14 +130,18 @@ class Insertion:
     ) -> Iterator[Solution]:
         """Push (or pull) the tip to each depth in turn and yield the wire there.
 
-        depths_mm : arc lengths from the entry to the tip, from 0 to 1e7 mm and 1e6 segments; beyond ``max_joints``
-        segments they yield TOO_LONG.     roll_deg : of the base.     catheter_mm : the catheter's tip beyond the entry,
-        no deeper than the wire's; both are one for all or one per depth. Between two depths wire, roll and catheter
-        advance in proportion; push_force_N acts on the wire, with the catheter held.
-        Each call sets both anew: left out, the base is turned back to 0 and the catheter pulled back to 0.
-        A depth that cannot be reached yields the last good state with its own depth and a status.
-        The arguments are checked at once. The first depth of a call ends the calls before it: going on with one of
-        those raises RuntimeError, and so does a call while another thread moves this wire.
+        depths_mm : arc lengths from the entry to the tip, 0 to 1e7 mm and at most 1e6 segments. Beyond ``max_joints``
+        segments the status is TOO_LONG.
+        roll_deg : roll of the base.     catheter_mm : how far the catheter's tip is beyond the entry, at most the
+        wire's depth. Each is one number for all depths or one per depth; if left out, the base is turned back to 0 and
+        the catheter pulled back to 0, whatever an earlier call set. Between two depths wire, roll and catheter advance
+        in proportion. push_force_N is the force on the wire while the catheter is held.
+
+        A depth that cannot be reached yields the last good state, with the depth of that state and a status that says
+        why.
+        Arguments are checked when this is called, not when the first depth is asked for. Only the latest call moves the
+        wire: once its first depth is asked for, going on with an earlier call raises RuntimeError. So does a call while
+        another thread moves this wire.
         """
         return self._each(*self._goals(depths_mm, roll_deg, catheter_mm))
 
@@ -204,7 +212,7 @@ class Insertion:
         return depth_mm < self._too_long and self._refused is None
 
     def clone(self) -> Self:
-        """A second insertion where this one is, to the last bit; both go on from there, each on its own way."""
+        """A copy of this insertion in its present state, to the last bit. The two go on independently."""
         twin = object.__new__(type(self))
         twin.__setstate__(self.__getstate__())
         return twin

@@ -29,16 +29,19 @@ MOST_THREADS = 4096
 
 
 class Insertions:
-    """Insertions that go their ways at the same time, each with its own wire, wall, clamp, depths and rolls.
+    """Many insertions computed at the same time, each with its own wire, wall, clamp, depths and rolls.
 
-    insertions : they may have gone some way already, and may go on alone afterwards. Wires whose walls are made from
-    one another by ``VesselWall.like`` go in lock-step, POOL of them in WIDTH lanes. Each ends where it would alone, to
-    rounding (1e-9 mm, away from snaps); a straight wire, which alone is swept without its roll, in 1 % of depths to the
-    tolerance of a relaxation (1e-5 mm), and at a fork, once in 10,000 depths, perhaps on its other side. Insertions
-    with friction, a finite torsional stiffness, a sampled hull, a shaft with friction, a weight, no wall or the closed
-    form go alone.
-    threads : how many to use (default: one per core); they run without Python's global lock.
-    Raises ValueError where one insertion is given twice, or with a catheter.
+    insertions : each may be at some depth already, and may be used alone afterwards.     threads : how many to use, by
+    default one per core; they run without Python's global lock.
+
+    Wires whose walls are made from one another by ``VesselWall.like`` advance in lock-step, WIDTH of them at a time in
+    the processor's vector lanes, taken from a pool of POOL. Insertions with friction, a finite torsional stiffness, a
+    sampled hull, a shaft with friction, a weight, no wall or the closed form are computed one by one.
+
+    Results are those of ``Insertion.to_depths``, up to rounding (1e-9 mm, away from snaps). There are two exceptions:
+    for a wire that is straight at rest, 1 % of depths agree only to the tolerance of a relaxation (1e-5 mm), and where
+    two ways are equally good, once in 10,000 depths, the other one may be taken.
+    Raises ValueError where one insertion is given twice, or one has a catheter.
     """
 
     def __init__(self, insertions: Iterable[Insertion], *, threads: int | None = None) -> None:
@@ -56,10 +59,10 @@ class Insertions:
     def to_depths(
         self, depths_mm: Sequence[float] | Sequence[Sequence[float]], roll_deg: float | Sequence[Any] = 0.0
     ) -> list[list[Solution]]:
-        """Push (or pull) every tip to its depths, as ``Insertion.to_depths`` does; a list of solutions for each.
+        """Push (or pull) every tip to its depths; one list per insertion of what ``Insertion.to_depths`` yields.
 
-        depths_mm : the same for all (d,), or a sequence for each.     roll_deg : one for all, or for each insertion
-        what ``Insertion.to_depths`` takes.
+        depths_mm : one sequence (d,) for all insertions, or one sequence per insertion.     roll_deg : one number for
+        all, or per insertion what ``Insertion.to_depths`` takes.
         """
         count = len(self.insertions)
         given: Any = list(depths_mm) if isinstance(depths_mm, Iterator) else depths_mm

@@ -70,12 +70,13 @@ def _cross(a: Array, b: Array) -> Array:
 
 @dataclass(frozen=True)
 class Settings:
-    """How to relax.
+    """How a relaxation is computed, and when it is finished.
 
-    tolerance : Newton decrement relative to the energy.     max_iterations : of one relaxation; the closed form
-    may use five hundred sweeps for each.
-    quadrature : of the wall's energy. "tip" integrates it under the last segments and sums joints elsewhere,
-    "joints" is the paper's sum over joints (half a weight at the tip), "segments" integrates under all of them.
+    tolerance : the Newton decrement, relative to the energy, below which the wire is at rest.
+    max_iterations : of one relaxation; the closed form may use five hundred sweeps for each of them.
+    quadrature : how the energy of the wall is summed along the wire. "tip" integrates it under the last segments and
+    takes the sum over joints elsewhere; "joints" is the paper's sum over joints, with half a weight at the tip;
+    "segments" integrates it under all segments.
     """
 
     method: str = "newton"
@@ -115,13 +116,13 @@ def relax(
     max_iterations: int = 200,
     quadrature: str = "tip",
 ) -> Solution:
-    """Relax one wire from a start shape, under optional dead loads, in a wall or (``wall=None``) in free space.
+    """Relax one wire from a start shape, in a wall or (``wall=None``) in free space, under loads if there are any.
 
-    depth_mm : length beyond the entry.     start_mm : (m, 3) polyline from the entry that the wire is laid along
-    before it relaxes (straight along entry_direction by default); friction acts against leaving it.
-    load_N : (3,) dead force on the tip, or (k + 1, 3) on every joint, k from ``wire.segments_at(depth_mm)``.
-    down : (3,) LPS, where the wire's weight pulls.
-    Raises ValueError for arguments that cannot be used; failures of the relaxation are a Status.
+    depth_mm : length of wire beyond the entry.     start_mm : (m, 3) LPS polyline from the entry along which the wire
+    is laid before it relaxes (by default straight along entry_direction); with friction it resists leaving that.
+    load_N : (3,) a force on the tip, or (k + 1, 3) one on every joint, with k from ``wire.segments_at(depth_mm)``;
+    forces keep their direction.     down : (3,) LPS, the direction of gravity.
+    Raises ValueError for arguments that cannot be used; a relaxation that fails says so in the solution's status.
     """
     settings = Settings(method, tolerance, max_iterations, quadrature)
     check_scene("relax", wire, wall)

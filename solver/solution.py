@@ -45,10 +45,12 @@ class Status(Enum):
 
 
 class Snap(NamedTuple):
-    """An event: the wire gave way between two depths, mm. moved_mm : largest displacement of a joint.
+    """The wire gave way between two depths, mm, and jumped to another shape.
 
-    other_mm : distance, mm, to a second rest shape on the other side, whose energy is the same to 0.1 %; 0 where none
-    was found. Which of the two the wire took is arbitrary: what follows holds for that side, until both meet again.
+    moved_mm : largest displacement of a joint.
+    other_mm : distance, mm, to a second shape at rest on the other side whose energy is the same to 0.1 %; 0 where none
+    was found. Which of the two the wire took is arbitrary, and what follows holds for that side alone until both meet
+    again.
     """
 
     from_mm: float
@@ -64,30 +66,33 @@ _OF_PLACE = itemgetter(*map(_NAMES.index, ("energy", "dissipated", "since_doubt"
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """A wire at one depth, at rest if ``converged``; otherwise the last good state, and ``sentence`` says why.
+    """A wire at one depth. It is at rest if ``converged``; else it is the last good state, and ``sentence`` says why.
 
-    joints_mm : (k + 1, 3) from the entry to the tip, read-only.
-    frames : (k + 1, 3, 3), columns are material axes 1, 2 and the direction of the segment before the joint.
-    energy_N_mm : total, loads and weight included, as seen from the entry; bending_energy_N_mm, wall_energy_N_mm : its
-    parts.
-    friction_energy_N_mm : lost to friction on the way from the depth before, over all steps; not in energy_N_mm.
-    contact_force_N : (k + 1, 3), the wall's force on the wire at each joint.
-    reaction_force_N : (3,), the introducer's force on the wire; reaction_torque_N_mm : its torque about the axis.
-    push_force_N : the hand's axial force, dU/d(depth).     max_penetration_mm : deepest overlap of hull and wall.
-    counts : in the order of ``_kernels.records.COUNTERS``, see ``work``.
-    start_energy_N_mm : total energy that the last relaxation began with.
-    least_pivot : distance to instability: the least pivot of a joint, which is its stiffness with all joints beyond it
-    free to follow, over its own stiffness. 1 for a free wire, 0 where it snaps; below 0.5 it is soft, below 0.05 it
-    nearly gives way, or is free to turn about a round vessel's axis; a wall that holds it makes it more than 1. Where
-    torsion is finite the twist of shaft and wire counts as one joint more: 1/(1 - C dT/d(roll)) by its compliance C and
-    the hand's torque T, 0.5 where the tip turns twice as far as the hand, 0 where it whips. NaN where ``relax`` ends in
-    a state that is not at rest.
-    dissipated_N_mm : the hand's work on the way to this depth minus the change of energy. The work is integrated by the
-    trapezium rule over each step: where the push jumps (a jump of rest curvature or stiffness passes the entry) it is
-    off by half the jump times the step, perhaps below 0. It includes friction_energy_N_mm.     snaps : on that way.
-    uncertain : shorter steps may lead elsewhere: here or a few mm before (longer while it stays soft) the wire snapped,
-    was about to, took one of two equally good sides, or went elsewhere in long steps than in short ones.
-    radius_mm : the wire's.
+    joints_mm : (k + 1, 3) LPS from the entry to the tip, read-only.
+    frames : (k + 1, 3, 3); the columns are material axes 1 and 2 and the direction of the segment before the joint.
+    energy_N_mm : the total, including loads and weight, with heights and loads counted from the entry.
+    bending_energy_N_mm, wall_energy_N_mm : parts of it.
+    friction_energy_N_mm : lost to friction since the depth before, over all steps; not a part of energy_N_mm.
+    contact_force_N : (k + 1, 3), the force of the wall on the wire at each joint.
+    reaction_force_N : (3,), the force of the introducer on the wire.     reaction_torque_N_mm : its torque about the
+    axis.
+    push_force_N : the axial force of the hand, dU/d(depth).
+    max_penetration_mm : deepest overlap of the wire's hull with the wall.
+    counts : in the order of ``_kernels.records.COUNTERS``; ``work`` has them by name.
+    start_energy_N_mm : the total energy at the start of the last relaxation.
+    least_pivot : how far the wire is from giving way, the least value over all joints. A joint's value is the stiffness
+    that is left when all joints beyond it are free to follow, over its own stiffness. It is 1 for a free wire and 0
+    where the wire snaps; below 0.5 the wire is soft; below 0.05 it nearly gives way, or is free to turn about the axis
+    of a round vessel; above 1 a wall holds it. With a finite torsional stiffness the twist of shaft and wire counts as
+    one more joint, of value 1/(1 - C dT/d(roll)) with its compliance C and the torque T of the hand: 0.5 where the tip
+    turns twice as far as the hand, 0 where it whips. NaN where ``relax`` ends in a state that is not at rest.
+    dissipated_N_mm : the work of the hand since the depth before, minus the change of energy; friction_energy_N_mm is a
+    part of it. The work is integrated by the trapezium rule over each step, so where the push force jumps (a jump of
+    rest curvature or stiffness passes the entry) it is off by half the jump times the step and may be negative.
+    snaps : the snaps since the depth before.
+    uncertain : shorter steps may lead elsewhere. Here, or a few mm before (longer while the wire stays soft), it
+    snapped, was about to snap, took one of two equally good sides, or went elsewhere in long steps than in short ones.
+    radius_mm : the radius of the wire.
     """
 
     joints_mm: Array

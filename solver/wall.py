@@ -106,14 +106,14 @@ def _padded(coefficients: Array) -> NDArray[np.float32]:
 
 @dataclass(frozen=True, eq=False)
 class VesselWall:
-    """The lumen's wall as a signed distance in mm, negative inside; its law is in ``_kernels.wall_law``.
+    """The wall of a lumen, given by the signed distance to it in mm, negative inside. Its law is ``_kernels.wall_law``.
 
-    stiffness_N_mm2 : k, in N/mm per mm of wire.     friction : Coulomb's coefficient, 0 costs nothing.
-    hull : "offset" (d = max(0, φ + radius), the deepest point of the round hull) or "samples:N" (the mean of N points
-    around each joint). A wall of the same k is softer with samples, the more so the shallower it is pressed in: of
-    many points few lie deepest.
-    Beyond the grid the distance continues linearly. Raises ValueError for NaN or inf in the grid; warns where it
-    is no distance in mm by its slope at the wall.
+    stiffness_N_mm2 : k, in N/mm per mm of wire.     friction : Coulomb's coefficient; 0 costs no time.
+    hull : how the overlap d of a round wire with the wall is measured. "offset" takes its deepest point, d = max(0, φ +
+    radius). "samples:N" takes the mean over N points around each joint. With the same k, a wall is softer with samples,
+    and the more so the less deep the wire is pressed in, since few of the N points are then in the wall.
+    Beyond the grid the distance continues linearly. Raises ValueError for NaN or inf in the grid; warns if the slope at
+    the wall shows that the values are no distances in mm.
     """
 
     distance: Grid
@@ -151,9 +151,10 @@ class VesselWall:
         return other
 
     def shifted(self, offset_mm: ArrayLike) -> "VesselWall":
-        """The lumen with an offset (nx, ny, nz), mm, added to its distance: positive makes it narrower.
+        """The wall with an offset (nx, ny, nz), mm, added to its distance; a positive offset makes the lumen narrower.
 
-        Half the time of a new wall: the creases stay where they were, so the offset must be smooth and small.
+        It takes half the time of a new wall, since creases of the distance are assumed to stay where they were: the
+        offset must be smooth and small.
         """
         offset = numbers("wall", "offset_mm", offset_mm, self.distance.shape, OFFSET_MM).copy()
         values = self.distance.values + offset

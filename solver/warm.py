@@ -43,9 +43,9 @@ def no_collection() -> Iterator[None]:
 
 
 def warm_up(*, beside: bool = False) -> None:
-    """Compile every kernel (minutes, once per installation; later calls read the cache).
+    """Compile every kernel. It takes minutes, once per installation; later calls read what was compiled from the disk.
 
-    beside : a second process compiles what ``Insertions`` needs, more than half of it, at the same time.
+    beside : compile what ``Insertions`` needs, which is more than half of it, in a second process at the same time.
     """
     instance("solver", "beside", beside, bool)
     with no_collection():

@@ -42,14 +42,14 @@ def _table(name: str, value: Quantity, segment_mm: float) -> tuple[Array, Array]
 
 @dataclass(frozen=True, eq=False)
 class GuideWire:
-    """A wire as a chain of rigid segments; every profile is a function of the distance from the tip in mm.
+    """A wire as a chain of rigid segments. Profiles are functions of the distance from the tip in mm.
 
-    segment_mm : length of a segment.     radius_mm : radius of the outer hull.
-    bending_stiffness_N_mm2, rest_curvature_per_mm : a number, rows [distance from tip, value] (linear between,
-    constant beyond, two equal distances make a jump), or a callable of an array of distances (up to 2000 mm).
-    torsional_stiffness_N_mm2 : inf is ideal torque control (the paper's assumption).
-    weight_N_per_mm : weight in blood, buoyancy subtracted (7e-6 for 0.36 mm of steel); 0 leaves gravity out.
-    Positive rest curvature bends the wire towards material axis 1.
+    segment_mm : length of a segment.     radius_mm : outer radius.
+    bending_stiffness_N_mm2, rest_curvature_per_mm : profiles. Each is a number, or rows [distance from tip, value]
+    (linear between rows, constant beyond the last, a jump where two distances are equal), or a function that takes an
+    array of distances (up to 2000 mm). A positive rest curvature bends the wire towards material axis 1.
+    torsional_stiffness_N_mm2 : infinite for ideal torque control, which is the paper's assumption.
+    weight_N_per_mm : weight in blood, that is less its buoyancy (7e-6 for 0.36 mm of steel); 0 leaves gravity out.
     """
 
     segment_mm: float

@@ -44,6 +44,15 @@ def in_memory_order(grid: Grid) -> tuple[Grid, tuple[int, int, int]]:
     return contiguous(reorder(grid, axes)), axes
 
 
+def around(grid: Grid, points_mm: Array, room_mm: float) -> Grid:
+    """The grid, cropped to the box of some points (n, 3), LPS mm, and ``room_mm`` beyond it on every side."""
+    ends = zip(points_mm.min(axis=0) - room_mm, points_mm.max(axis=0) + room_mm, strict=True)
+    index = grid.to_index(np.array(np.meshgrid(*ends)).reshape(3, -1).T)
+    low = np.clip(np.floor(index.min(axis=0)), 0, np.array(grid.shape) - 1).astype(int)
+    high = np.clip(np.ceil(index.max(axis=0)) + 1, low + 1, grid.shape).astype(int)
+    return grid.crop((low[0], low[1], low[2]), (high[0], high[1], high[2]))
+
+
 def integer_offset(grid: Grid, inner: Grid) -> NDArray[np.int64] | None:
     """Index (3,) in ``grid`` of voxel (0, 0, 0) of ``inner`` if both lie on one lattice, else None.
 

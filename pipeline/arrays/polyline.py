@@ -14,7 +14,7 @@ UNITS_MM = {"mm": 1.0, "cm": 10.0, "inch": 25.4, "m": 1000.0, "µm": 1e-3}
 """Units in which a length may have been given by mistake."""
 
 
-def other_units(stated: str = "mm") -> dict[str, float]:
+def other_units(stated: str) -> dict[str, float]:
     """Factors by which lengths that were taken for ``stated`` grow where they are in another unit."""
     return {name: factor / UNITS_MM[stated] for name, factor in UNITS_MM.items() if name != stated}
 
@@ -98,8 +98,8 @@ def angle_deg(a: Array, b: Array) -> float:
     return float(np.degrees(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b)))
 
 
-def smooth(path_mm: ArrayLike, sigma_mm: float, step_mm: float = 0.5) -> Array:
-    """Smoothing cubic spline through a voxel path whose points scatter by ``sigma_mm`` per axis, ends included."""
+def smooth(path_mm: ArrayLike, sigma_mm: float) -> Array:
+    """Smoothing cubic spline through a voxel path whose points scatter by ``sigma_mm`` per axis. Steps of 0.5 mm."""
     path = np.asarray(path_mm, dtype=np.float64)
     if len(path) < 5:
         return path
@@ -107,4 +107,4 @@ def smooth(path_mm: ArrayLike, sigma_mm: float, step_mm: float = 0.5) -> Array:
         # its search for the asked smoothness may stop short on a nearly straight path; what it has is smooth enough
         warnings.filterwarnings("ignore", message=r"(?s).*smoothing spline", category=RuntimeWarning)
         spline, _ = make_splprep(path.T, s=3.0 * len(path) * sigma_mm**2)
-    return resample(np.asarray(spline(np.linspace(0.0, 1.0, 4 * len(path)))).T, step_mm)
+    return resample(np.asarray(spline(np.linspace(0.0, 1.0, 4 * len(path)))).T, 0.5)

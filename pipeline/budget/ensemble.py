@@ -6,15 +6,18 @@ from itertools import groupby
 
 import numpy as np
 
+from pipeline.arrays.grids import around
 from pipeline.arrays.polyline import at_arc
 from pipeline.budget.inputs import Member
-from pipeline.budget.surface import around, displaced
+from pipeline.budget.surface import displaced
 from pipeline.model import Array, Lumen, OverWire, Wall, Wire
 from pipeline.simulate import insertion_of, together, wall_of
 from pipeline.simulate.config import SolverConfig
 from solver import VesselWall
 
 NARROWEST_MM = 1e-3
+ROOM_MM = 6.0
+"""Margin of the cropped lumen around the nominal wires: a member's wire may lie elsewhere by that much."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +39,7 @@ class Scene:
 
     def vessel(self) -> VesselWall:
         """The lumen's wall around the nominal wires."""
-        return wall_of(around(self.lumen.distance, list(self.wires)), self.solver.hull)
+        return wall_of(around(self.lumen.distance, np.concatenate(self.wires), ROOM_MM), self.solver.hull)
 
 
 def replayed(scene: Scene, ensembles: Sequence[Sequence[Member]], arc_mm: Sequence[Array]) -> list[list[Array]]:

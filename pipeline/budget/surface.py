@@ -10,18 +10,6 @@ KNOT_VOXELS = 1.9
 of 0.82 of that. A segmented carotid of 0.2 to 0.6 mm voxels is correlated as by one of 1.4 to 1.8 voxels."""
 MEAN_SQUARE = 151.0 / 315.0
 """Sum over the knots of the squared weights of a cubic B-spline, mean over a cell; in space its third power."""
-ROOM_MM = 6.0
-"""Margin of the cropped lumen around the wires: a member may lie elsewhere by that much."""
-
-
-def around(distance: Grid, wires: list[Array]) -> Grid:
-    """The signed distance, cropped to the surroundings of some wires (n, 3)."""
-    points = np.concatenate(wires)
-    corners = np.array(np.meshgrid(*zip(points.min(axis=0) - ROOM_MM, points.max(axis=0) + ROOM_MM, strict=True)))
-    index = distance.to_index(corners.reshape(3, -1).T)
-    low = np.clip(np.floor(index.min(axis=0)), 0, np.array(distance.shape) - 1).astype(int)
-    high = np.clip(np.ceil(index.max(axis=0)) + 1, low + 1, distance.shape).astype(int)
-    return distance.crop((low[0], low[1], low[2]), (high[0], high[1], high[2]))
 
 
 def _weights(count: int, knot: float) -> Array:

@@ -54,13 +54,13 @@ def main(args: argparse.Namespace) -> int:
 def _fit(args: argparse.Namespace, cases: "tuple[Case, ...]", config: "Config", store: "Store") -> int:
     """Fit, write, and say what was found."""
     from pipeline.calibrate.unknowns import spread_in_words
-    from pipeline.run.calibration import calibrate, file_in, gathered
+    from pipeline.run.calibration import calibrate, gathered
     from pipeline.run.calibration_files import flattened, misfit, write_parameters, write_record
     from reports.calibration import gained, render_calibration
 
     found = gathered(cases, config, store, (lambda _: None) if args.quiet else say)
     fit = calibrate(found, config)
-    file = file_in(args.out)
+    file = args.out / "parameters.toml"
     before = file.read_bytes() if file.exists() else b""
     written = write_parameters(file, found, fit)
     write_record(args.out / "calibration.json", found, fit)

@@ -47,10 +47,10 @@ def compare(
     way: VesselAxis | None = None,
     ahead_mm: float = 0.0,
 ) -> Comparison:
-    """Errors of one simulated wire against the traced one; refuses an empty curve with ValueError.
+    """Errors of one simulated wire against the traced one. Raises ValueError for an empty curve.
 
-    way : the vessel's axis and branches, which all frames share; without it there are the lumen's branches and no axis.
-    ahead_mm : how far the traced curve begins beyond the plane in which the wire does.
+    way : the vessel's axis and branches, found once for all frames; without it the branches are found here, and no
+    metric has an axis.     ahead_mm : how far beyond the plane in which the wire begins the traced curve begins.
     """
     start = traced.points_mm[:1] if len(traced.points_mm) else np.zeros((1, 3))
     pair = pair_of(
@@ -63,9 +63,9 @@ def compare(
 def compare_truth(
     truth_mm: Array, traced: Curve | None, simulated: Simulated | None, config: CompareConfig = CompareConfig()
 ) -> dict[str, float]:
-    """Synthetic studies only: errors of both curves against the true wire by their columns' names, mm.
+    """Synthetic studies only: errors of both curves against the true wire, mm, by their columns' names.
 
-    One-sided, from equal steps along each curve to the truth; what has no curve has no entry.
+    Distances go from equal steps along each curve to the true wire. A curve that does not exist has no entry.
     """
     values: dict[str, float] = {}
     if traced is not None and len(traced.points_mm) > 1:

@@ -60,16 +60,18 @@ def fields(values: Mapping[str, Any], said: str = "") -> tuple[dict[str, Any], s
 
 
 def holding(value: float, low: float, high: float) -> Interval:
-    """The interval, widened to hold its value, which may be pooled otherwise or differ in the last digit."""
+    """The interval, widened to hold its value, which may be pooled in another way or differ in the last digit."""
     return Interval(min(low, value), max(high, value))
 
 
 def of_log_ratio(over: Array, under: Array, points: Array, *, rest: Array | None = None) -> Interval:
-    """Interval of log(sum of ``over`` / sum of ``under``), each (insertions,), as is ``points``, their point counts.
+    """Interval of log(sum of ``over`` / sum of ``under``).
 
-    With the points themselves as ``under`` it is that of the log mean square. Cox's takes both per point, so that
-    different lengths of insertions do not widen it.     rest : (2, insertions), both sums without each insertion, where
-    they are not those of the others, as it has a part in these, too.
+    over, under, points : (insertions,), of which the last are the numbers of points. With the numbers of points as
+    ``under``, it is the interval of the logarithm of a mean square. Cox's interval takes both sums per point, so that
+    insertions of different lengths do not widen it.
+    rest : (2, insertions) both sums with one insertion left out, each in turn; needed where the sum over the others
+    changes when one is left out, since that one has a part in their values.
     """
     count = len(points)
     if count < FEWEST:
@@ -115,11 +117,11 @@ def of_medians(values: Sequence[Array]) -> Interval:
 
 
 def effective_frames(values: Sequence[Array]) -> float:
-    """Number of independent frames that would tell as much. values : (n,) of each insertion's frames, in their order.
+    """The number of independent frames that would tell as much. values : (n,) of each insertion's frames, in order.
 
-    The model: successive frames have one correlation (pooled, corrected for its bias of -(1 + 3 r) / n), and insertions
-    have a variance of their own. Of insertions that are equally long at least 1 for each; NaN where it cannot be known:
-    none has four frames.
+    The model: successive frames of an insertion are correlated, by one coefficient that is pooled over insertions and
+    corrected for its bias of -(1 + 3 r) / n, and insertions differ from each other by a variance of their own. If all
+    are equally long, each counts as one frame at least. NaN where no insertion has four frames.
     """
     own = [np.asarray(v, dtype=float) - np.mean(v) for v in values if len(v) > 3]
     if not own or not sum(float(v @ v) for v in own):

@@ -78,14 +78,19 @@ class VesselAxis:
 
 @dataclass(frozen=True, eq=False)
 class Pair:
-    """A simulated wire and the traced curve of the same frame.
+    """The simulated wire and the traced curve of one frame, and where they are compared.
 
-    wire_mm (k, 3), curve_mm (m, 3) : joints and points, entry to tip.     curve_length_mm : of the traced curve.
-    sample_mm (n, 3), arc_mm (n,) : equal steps along the wire behind the clamp's reach, so that neither the segment
-    length nor the density of the trace can flatter.     error_mm, foot_arc_mm (n,) : distance of each to the curve,
-    and where along it that is.     back_mm : distances the other way, from equal steps along the curve, behind the
-    reach, to the wire.     equal_mm (2, c, 3) : points of the wire and of the curve at equal arc lengths, behind the
-    reach, as far as both go.     lumen : the vessel.     way : the vessel's axis and branches.
+    Points are LPS mm, from the entry to the tip.
+    wire_mm (k, 3), curve_mm (m, 3) : joints of the wire, points of the curve.     curve_length_mm : length of the
+    curve.
+    sample_mm (n, 3), arc_mm (n,) : the compared points of the wire, in equal steps along it, and their arc lengths.
+    Equal steps make errors independent of the length of the segments. The beginning, to which the clamp was fitted, is
+    left out.
+    error_mm, foot_arc_mm (n,) : the distance of each to the curve, and the arc length along the curve of the place that
+    is nearest.     back_mm : distances the other way, from equal steps along the curve to the wire, without its
+    beginning.
+    equal_mm (2, c, 3) : points of the wire and of the curve at the same arc lengths, as far as both reach, without the
+    beginning.     lumen : the vessel.     way : its axis and branches.
     """
 
     wire_mm: Array
@@ -112,9 +117,9 @@ SHORT_MM = 2.0
 
 
 def scored(arc_mm: Array, skip_mm: float) -> Array:
-    """The arc lengths that count of a wire's (n,): those behind the clamp's reach, where the clamp was fitted.
+    """Of arc lengths (n,) along a wire those at which it is scored: beyond ``skip_mm``, where the clamp was fitted.
 
-    Of a wire that is hardly longer than that, the last 2 mm; of one shorter than 4 mm, the last half.
+    Of a wire that is hardly longer than that the last 2 mm are scored, of one shorter than 4 mm the last half.
     """
     length = float(arc_mm[-1])
     return np.asarray(arc_mm[arc_mm >= min(skip_mm, max(length - SHORT_MM, 0.5 * length)) - 1e-9])
@@ -123,10 +128,10 @@ def scored(arc_mm: Array, skip_mm: float) -> Array:
 def pair_of(
     simulated: Simulated, traced: Curve, lumen: Lumen, config: CompareConfig, way: VesselAxis, ahead_mm: float = 0.0
 ) -> Pair:
-    """Sample both curves and measure their distances; ValueError where one of them is empty.
+    """Sample both curves and measure their distances. Raises ValueError where one of them is empty.
 
-    ahead_mm : how far the traced curve begins beyond the plane in which the wire does. A trace begins in the plane of
-    the manifest's entry, a wire where the clamp was found to be; arc lengths of both are counted from there.
+    ahead_mm : how far beyond the plane in which the wire begins the traced curve begins. A trace begins in the plane of
+    the manifest's entry, a wire where the clamp was found to be; arc lengths of both are counted from the latter.
     """
     wire, curve = simulated.joints_mm, traced.points_mm
     if len(curve) < 2 or len(wire) < 2:
@@ -158,17 +163,17 @@ def rms(values: ArrayLike) -> float:
 
 
 def distal(error_mm: Array, arc_mm: Array, length_mm: float) -> Array:
-    """Of point errors (n,) at arc lengths (n,), as far as they count, those of the wire's last ``length_mm``."""
+    """Of point errors (n,) at arc lengths (n,) those of the last ``length_mm`` of the wire."""
     return np.asarray(error_mm[arc_mm >= arc_mm[-1] - length_mm - 1e-9])
 
 
 def distal_rms(pair: Pair, length_mm: float) -> float:
-    """Root mean square of these, mm."""
+    """Root mean square of the point errors in the last ``length_mm`` of the wire, mm."""
     return rms(distal(pair.error_mm, pair.arc_mm, length_mm))
 
 
 def same_branch(pair: Pair) -> bool:
-    """Whether both tips lie in one branch of the lumen's graph; where branches meet, all of them are one."""
+    """Whether both tips lie in one branch of the vessel. A place where branches meet belongs to all of them."""
     first, second = (pair.way.branches.at(curve[-1]) for curve in (pair.wire_mm, pair.curve_mm))
     return bool(first & second)
 
@@ -187,7 +192,7 @@ def tip_offset(pair: Pair) -> tuple[float, float]:
 
 
 def depth_offset(pair: Pair) -> float:
-    """How much deeper the simulated wire lies along itself, mm: mean of the part along the trace at equal arc."""
+    """How much deeper the simulated wire lies, mm: mean offset of points of equal arc length, along the trace."""
     wire, curve = pair.equal_mm
     if len(curve) < 2:
         return float("nan")
@@ -197,7 +202,7 @@ def depth_offset(pair: Pair) -> float:
 
 
 def side_agrees(pair: Pair) -> float:
-    """Share of the points, of those where both wires lie 0.1 mm or more off the axis, at which they lie on one side."""
+    """Share of the points, where both wires lie 0.1 mm or more off the axis, at which they lie on the same side."""
     axis = pair.way.axis_mm
     if axis is None or len(axis) < 2:
         return float("nan")

@@ -11,6 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
+from pipeline.arrays.grids import around
 from pipeline.arrays.polyline import at_arc, samples, smooth, to_length
 from pipeline.compare.branches import branches_of
 from pipeline.compare.config import CompareConfig
@@ -46,12 +47,7 @@ class Clues:
     @cached_property
     def room(self) -> Grid:
         """The signed distance, cropped around the traced wires: for a circle of Willis a tenth of the memory."""
-        grid, points = self.lumen.distance, np.vstack([self.clamp.entry_mm, self.deepest_mm])
-        corners = zip(points.min(axis=0) - ROOM_MM, points.max(axis=0) + ROOM_MM, strict=True)
-        index = grid.to_index(np.array(np.meshgrid(*corners)).reshape(3, -1).T)
-        low = np.clip(np.floor(index.min(axis=0)), 0, np.array(grid.shape) - 1).astype(int)
-        high = np.clip(np.ceil(index.max(axis=0)) + 1, low + 1, grid.shape).astype(int)
-        return grid.crop((low[0], low[1], low[2]), (high[0], high[1], high[2]))
+        return around(self.lumen.distance, np.vstack([self.clamp.entry_mm, self.deepest_mm]), ROOM_MM)
 
     @cached_property
     def centreline(self) -> Array | None:
@@ -104,10 +100,11 @@ class Clues:
 
 @dataclass(frozen=True, eq=False)
 class PredictorInputs:
-    """What a predictor may see beside the depth.
+    """What a predictor may see besides the depth.
 
-    previous_mm, following_mm : (n, 3) the last trusted trace before the frame, the first after it.     tip_mm : (3,)
-    of the frame itself.     simulated : wires of simulators that lack something, by the predictor's name.
+    previous_mm, following_mm : (n, 3) the last trusted trace before this frame, and the first one after it.
+    tip_mm : (3,) the traced tip of this frame.     simulated : our solver's wires with a part of the input left out, by
+    the name of the predictor.
     """
 
     previous_mm: Array | None = None
@@ -152,7 +149,7 @@ def to_this_tip(clues: Clues, depth_mm: float, seen: PredictorInputs) -> Array |
 
 
 def between(_: Clues, depth_mm: float, seen: PredictorInputs) -> Array | None:
-    """The mean, at equal arc length, of the frames before and after: it saw where the wire went."""
+    """The mean, at equal arc lengths, of the traces before and after this frame: they show where the wire went."""
     sides = [of_path(curve, depth_mm) for curve in (seen.previous_mm, seen.following_mm)]
     arc = samples(depth_mm, 0.5)
     both = [at_arc(curve, arc) for curve in sides if curve is not None]

@@ -19,11 +19,11 @@ Row = Mapping[str, Any]
 
 
 class Scored(NamedTuple):
-    """A frame that counts: its row, its point errors (n,) in mm and the insertion that it belongs to.
+    """A frame that counts: its row of errors.csv, its point errors (n,) in mm and the insertion that it belongs to.
 
-    arc_mm : (n,) where the points lie along the wire, from the entry.     guesses : where the predictor ``another`` has
-    a guess, by insertion that it is made of the sum of squares in mm^2 and the number of points.     case : that the
-    frame is of; an insertion may have several.
+    arc_mm : (n,) where the points lie along the wire, from the entry.     guesses : for a frame of which the predictor
+    ``another`` has a guess: by the insertion from which the guess was made, its sum of squares in mm^2 and the number
+    of points.     case : the case of the frame; one insertion may be in several cases.
     """
 
     row: Row
@@ -172,10 +172,11 @@ def skill(frames: Sequence[Scored], squares: Array, nulls: Array, rival: str = "
 
 
 def without_each(frames: Sequence[Scored], squares: Array, nulls: Array) -> Array:
-    """Sums (2, insertions) of squares and of ``another``'s over the frames of all insertions but one, each in turn.
+    """Sums (2, insertions) of the squares and of those of ``another``, leaving out each insertion in turn.
 
-    The one is left out of the guesses that were made of it, too: insertions share each other as predictors, and as if
-    they did not, an interval covers in 76 to 78 % (Arvesen, Ann. Math. Stat. 40, 1969, on U-statistics).
+    The guesses that were made from the one that is left out are left out, too. Insertions serve each other as
+    predictors, and an interval that takes them for independent covers in 76 to 78 % (Arvesen, Ann. Math. Stat. 40,
+    1969, on U-statistics).
     """
     number = {name: n for n, name in enumerate(dict.fromkeys(frame.insertion for frame in frames))}
     sums = np.array(by_insertion(frames, squares, nulls))
@@ -194,7 +195,7 @@ def without_each(frames: Sequence[Scored], squares: Array, nulls: Array) -> Arra
 
 
 def all_guesses_of(frames: Sequence[Scored]) -> str:
-    """The insertion of which all guesses of the others' frames are made: nothing is left without it. Empty: none."""
+    """The insertion from which all guesses for the others were made; empty if there is none such."""
     names = dict.fromkeys(frame.insertion for frame in frames)
     found = (one for one in names if all(frame.guesses.keys() <= {one} for frame in frames if frame.insertion != one))
     return next(found, "")
@@ -206,10 +207,11 @@ together: the first frame has no previous one, and no path leads to some tips.""
 
 
 def strongest(frames: Sequence[Scored], squares: Array, points: Array) -> tuple[dict[str, Any], str]:
-    """Skill against the strongest predictor, the one with the least error of those that are told nothing of the frame.
+    """Skill against the strongest predictor, its name, and a note on the interval.
 
-    Also its name, and the note on its interval. All are judged on the same frames, ``strongest_frames`` of them: a
-    predictor without a guess for the hardest one would look strong, or be beaten by much, for that alone.
+    The strongest is the one with the least error among those that are told nothing of the frame. All predictors are
+    judged on the same frames, of which ``strongest_frames`` is the number: one that has no guess for the hardest frame
+    would look strong for that reason alone.
     """
     result: dict[str, Any] = {"frame_spacing_mm": frame_spacing(frames)}
     nulls = {name: points * numbers(frames, f"null_{name}_rms_mm") ** 2 for name in rivals()}
@@ -246,8 +248,9 @@ def frame_spacing(frames: Sequence[Scored]) -> float:
 def judged(known: Mapping[str, NDArray[np.bool_]], points: Array) -> tuple[list[str], NDArray[np.bool_]]:
     """The predictors that are compared with each other, and the frames (frames,) for which all of them have a guess.
 
-    known : by name, the frames for which it has one.     points : number in each frame.     A predictor takes part that
-    has LEAST_SHARE of all points; while all together have less in common, the one is dropped that costs most of it.
+    known : by predictor, the frames for which it has a guess.     points : (frames,) number of points. A predictor
+    takes part if its frames hold LEAST_SHARE of all points. While the frames that all have in common hold less than
+    that, the predictor is dropped that costs most of them.
     """
 
     def share(names: Sequence[str]) -> float:

@@ -10,7 +10,7 @@ from pipeline.load.chain import one_chain
 from pipeline.load.geometry import refused, unusable
 from pipeline.load.guard import reachable, read_json, told
 from pipeline.load.outside import UNITS_MM, millimetres, to_number
-from pipeline.load.stated import stated_in
+from pipeline.load.stated import stated_in_table
 from pipeline.load.surfaces import RAS_TO_LPS, read_vtp
 from pipeline.load.tables import rows_of
 from pipeline.model import Array, Curve
@@ -74,9 +74,8 @@ def read_markups_curve(path: Path) -> NDArray[np.float64]:
     return positions_of(path, found[0])
 
 
-def read_csv_points(path: Path) -> NDArray[np.float64]:
-    """Points (n, 3), LPS mm: columns x_mm, y_mm, z_mm (or x, y, z) by name, else the three of a bare table."""
-    rows, _ = rows_of(path)
+def points_in_table(path: Path, rows: list[list[str]]) -> NDArray[np.float64]:
+    """Points (n, 3) as written: columns x_mm, y_mm, z_mm (or x, y, z) by name, else the three of a bare table."""
     if not rows:
         raise refused(path, "an empty file", "points", "columns x_mm, y_mm, z_mm")
     head = [c.strip().lower() for c in rows[0]]
@@ -124,7 +123,14 @@ def read_vtp_points(path: Path) -> NDArray[np.float64]:
     return one_chain(path, shapes.points_mm, shapes.lines) if shapes.lines else shapes.points_mm
 
 
-READERS = {".csv": read_csv_points, ".vtp": read_vtp_points, ".mrk.json": read_markups_curve}
+READERS = {".vtp": read_vtp_points, ".mrk.json": read_markups_curve}
+"""All but tables, in which the meaning of the numbers stands beside them."""
+KINDS = (".csv", *READERS)
+
+
+def distinct(points: Array) -> Array:
+    """Points (n, 3) less those that repeat the one before."""
+    return np.asarray(points[np.any(np.diff(points, axis=0, prepend=np.nan) != 0, axis=1)])
 
 
 def read_curve(path: Path) -> Curve:
@@ -132,19 +138,20 @@ def read_curve(path: Path) -> Curve:
 
     Repeated points are dropped. Raises LoadError for another kind of file, fewer than two points or a NaN.
     """
-    kind = next((k for k in READERS if path.name.lower().endswith(k)), None)
+    kind = next((k for k in KINDS if path.name.lower().endswith(k)), None)
     if kind is None:
-        raise refused(path, repr(path.suffix), ", ".join(READERS), "export the curve in one of these")
-    points = READERS[kind](path)
+        raise refused(path, repr(path.suffix), ", ".join(KINDS), "export the curve in one of these")
     if kind == ".csv":
-        space, unit = stated_in(path, kind)
+        rows, comments = rows_of(path)
+        points = points_in_table(path, rows)
+        space, unit = stated_in_table(path, rows, comments)
         points = points * SYSTEMS[space or "LPS"] * millimetres(path, unit or "mm")
+    else:
+        points = READERS[kind](path)
     if len(points):
         reachable(path, points)
-    if len(points):
-        keep = np.concatenate([[True], np.any(np.diff(points, axis=0) != 0, axis=1)])
-        points = points[keep]
-    if len(points) < 2 or not np.all(np.isfinite(points)):
+        points = distinct(points)
+    if len(points) < 2:
         raise refused(path, f"{len(points)} points", "two or more, all finite", "correct the file")
     return Curve(points, np.full(len(points), np.nan), note=f"given: {path.name}")
 
@@ -167,7 +174,7 @@ def read_truth(path: Path, frame_count: int | None) -> list[Array]:
     if len(curves) != frame_count or any(c.ndim != 2 or c.shape[1] != 3 for c in curves):
         raise unusable(path, f"holds {len(curves)} curves, expected {frame_count} of shape (n, 3), one per frame")
     for number, curve in enumerate(curves):
-        apart = 1 + int(np.count_nonzero(np.any(np.diff(curve, axis=0) != 0, axis=1))) if len(curve) else 0
+        apart = len(distinct(curve))
         if apart < 2:
             raise unusable(path, f"frame {number} holds {apart} points; expected two or more, apart from each other")
         reachable(path, curve, f"frame {number}: points")

@@ -7,7 +7,6 @@ from pathlib import Path
 from pipeline.load.geometry import refused, unusable
 from pipeline.load.outside import UNITS_MM
 from pipeline.load.surfaces import SPACE, named_space, space_of
-from pipeline.load.tables import rows_of
 
 HEAD = 4096  # bytes of a file of 3D Slicer or VTK in which it says what it is
 _UNIT = re.compile(r"(?:units?|coordinateUnits)\"?\s*[:=]\s*\"?([A-Za-zµμ]+)|lengths in (\w+)", re.IGNORECASE)
@@ -15,9 +14,7 @@ _SPEAKS = re.compile(r"(?<![a-z])ras(?![a-z])|right[ _-]*anterior", re.IGNORECAS
 
 
 def stated_in(path: Path, kind: str) -> tuple[str, str]:
-    """Space and unit that a file states, or that its format implies; empty where neither says."""
-    if kind == ".csv":
-        return _of_table(path)
+    """Space and unit that a file states, or that its format implies; empty where neither says. Not of tables."""
     with path.open("rb") as file:
         head = file.read(HEAD)
     # 3D Slicer's files are in mm: its own, LPS unless they say otherwise, and VTK's, in which it writes SPACE=;
@@ -28,12 +25,11 @@ def stated_in(path: Path, kind: str) -> tuple[str, str]:
     return space or "LPS" * markups, (unit[1] or unit[2]).lower() if unit else "mm" * slicer
 
 
-def _of_table(path: Path) -> tuple[str, str]:
-    """Space and unit by a table's comments, wherever they stand, else by the names of its columns.
+def stated_in_table(path: Path, rows: Sequence[Sequence[str]], comments: Sequence[str]) -> tuple[str, str]:
+    """Space and unit by a table's comments, wherever they stand, else by the names of its columns (its first row).
 
     LoadError where comments speak of RAS and do not state it: such a wire was taken for LPS.
     """
-    rows, comments = rows_of(path)
     names = {c.strip().lower() for c in rows[0]} if rows else set()
     default = ("LPS", "mm") if {"x_mm", "y_mm", "z_mm"} <= names else ("", "")
     spaces = [match for line in comments for match in SPACE.finditer(line)]

@@ -14,22 +14,18 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import AfterValidator, Field, ValidationError, model_validator
 
 from pipeline.load.geometry import unusable
 from pipeline.load.guard import read_json
 from pipeline.model import Array
-from pipeline.ranges import Finite, Vector
+from pipeline.ranges import Finite, Strict, Vector
 from pipeline.wording import said, sentences
 
 Row = tuple[Finite, Finite, Finite, Finite]
 
 
-class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class CArm(_Strict):
+class CArm(Strict):
     """A point source and a flat detector, LPS mm."""
 
     source_mm: Vector
@@ -52,7 +48,7 @@ def _two(points: list[tuple[float, float]]) -> list[tuple[float, float]]:
     return points
 
 
-class _Frame(_Strict):
+class _Frame(Strict):
     matrix: tuple[Row, Row, Row] | None = None
     c_arm: CArm | None = None
     points_px: Annotated[list[tuple[Finite, Finite]], AfterValidator(_two)]
@@ -75,7 +71,7 @@ class _Frame(_Strict):
         return np.array(self.matrix) if self.c_arm is None else self.c_arm.matrix
 
 
-class _File(_Strict):
+class _File(Strict):
     isocentre_mm: Vector
     leaf_mm: Vector
     translation: Literal["fitted", "none"] = "fitted"

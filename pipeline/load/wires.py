@@ -12,19 +12,20 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from pipeline.load.curves import READERS, read_csv_points
+from pipeline.load.curves import READERS, distinct, points_in_table
 from pipeline.load.geometry import LoadError, Source, refused, unusable
 from pipeline.load.guard import size_of
 from pipeline.load.hdf5 import require_written
 from pipeline.load.outside import to_whole
-from pipeline.load.stated import stated_in
+from pipeline.load.stated import stated_in, stated_in_table
 from pipeline.load.surfaces import RAS_TO_LPS
+from pipeline.load.tables import rows_of
 from pipeline.load.vtk import read_vtk_points
 from pipeline.model import Array
 
 OF_KIND = {**READERS, ".vtk": read_vtk_points}
 IN_HDF5 = (".h5", ".hdf5")
-KINDS = (*OF_KIND, *IN_HDF5)
+KINDS = (".csv", *OF_KIND, *IN_HDF5)
 UNITS_MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0}
 USUAL = {"space": "LPS", "unit": "mm"}
 """What is stated of coordinates, in the order of ``stated_in``, and what most have."""
@@ -137,29 +138,30 @@ def _read(path: Path, space: str, unit: str) -> OtherFile:
         return OtherFile(path.name, problem="the file is empty, or not there", missing=True)
     kind = kind_of(path)
     try:
-        points = OF_KIND[kind](path)
+        table = rows_of(path) if kind == ".csv" else None
+        points = OF_KIND[kind](path) if table is None else points_in_table(path, table[0])
     except (LoadError, ValueError, TypeError, KeyError, IndexError) as error:
         return OtherFile(path.name, problem=str(error).removeprefix(f"{path}: "))
     try:
-        in_space, in_unit = _agreed(path, kind, space, unit)
+        own = stated_in(path, kind) if table is None else stated_in_table(path, *table)
+        in_space, in_unit = _agreed(path, own, (space, unit))
     except LoadError as error:
         return OtherFile(path.name, problem=str(error).removeprefix(f"{path}: "), unclear=True)
     # all readers but that of tables convert a file that states RAS by themselves
-    turned = in_space == "RAS" and (OF_KIND[kind] is read_csv_points or not stated_in(path, kind)[0])
+    turned = in_space == "RAS" and (table is not None or not own[0])
     factor = 1.0 if kind == ".mrk.json" else UNITS_MM[in_unit]  # the reader of .mrk.json converts units itself
     return replace(_checked(path.name, points * factor * (RAS_TO_LPS if turned else 1.0)), unit=in_unit)
 
 
-def _agreed(path: Path, kind: str, space: str, unit: str) -> tuple[str, str]:
+def _agreed(path: Path, by_file: tuple[str, str], by_caller: tuple[str, str]) -> tuple[str, str]:
     """Space and unit of a file, as it or the caller states them; LoadError where neither does, or they differ."""
-    own = dict(zip(USUAL, stated_in(path, kind), strict=True))
-    given = dict(zip(USUAL, (space, unit), strict=True))
+    own, given = (dict(zip(USUAL, stated, strict=True)) for stated in (by_file, by_caller))
     for what in USUAL:
         if own[what] and given[what] and own[what] != given[what]:
             raise unusable(path, f"{what}: the file says {own[what]}, stated was {given[what]}; correct one of them")
     agreed = {what: own[what] or given[what] for what in USUAL}
     if missing := [what for what in USUAL if not agreed[what]]:
-        raise unusable(path, _unstated(missing, kind))
+        raise unusable(path, _unstated(missing, kind_of(path)))
     if agreed["unit"] not in UNITS_MM:
         raise unusable(path, f"unit {agreed['unit']!r}; allowed: {', '.join(UNITS_MM)}")
     return agreed["space"], agreed["unit"]
@@ -182,8 +184,7 @@ def _checked(name: str, points: Array) -> OtherFile:
     bad = np.flatnonzero(~np.all(np.isfinite(points), axis=1))
     if len(bad):
         return OtherFile(name, problem=f"{len(bad)} of {len(points)} points are NaN or infinite, the first is {bad[0]}")
-    if len(points):
-        points = points[np.concatenate([[True], np.any(np.diff(points, axis=0) != 0, axis=1)])]
+    points = distinct(points)
     if len(points) < 2:
         return OtherFile(name, problem=f"got {len(points)} different points; a wire has two or more")
     return OtherFile(name, points)

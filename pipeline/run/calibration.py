@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,7 +14,6 @@ from pipeline.calibrate.trials import Trial, depths_at
 from pipeline.calibrate.unknowns import Unknown, unknowns
 from pipeline.model import Array
 from pipeline.run.cache import Store
-from pipeline.run.calibrated import data_of
 from pipeline.run.inputs import Inputs
 from pipeline.run.log import Log
 from pipeline.run.stages import Context, run_stages
@@ -169,14 +167,3 @@ def design(cases: Sequence[Case], config: Config, store: Store) -> tuple[list[Pr
         return predicted(all_unknowns(cases), planned, config.solver), tuple(notes)
     except ValueError as error:
         raise CalibrationError([str(error)]) from None
-
-
-def used_by(found: Gathered) -> list[dict[str, Any]]:
-    """The cases that were calibrated with, as parameters.toml names them."""
-    pairs = zip(found.cases, found.voxels, strict=True)
-    return [{"case": case.id, "group": case.group, "data": [*data_of(case), *voxels]} for case, voxels in pairs]
-
-
-def file_in(out: Path) -> Path:
-    """Path of the parameters file in an output folder."""
-    return out / "parameters.toml"

@@ -9,7 +9,8 @@ import numpy as np
 from pipeline.calibrate.design import Predicted
 from pipeline.calibrate.estimates import Calibration, Estimate
 from pipeline.calibrate.unknowns import BENDING, FRICTION, REST, ROLL, TAPER, WALL, bent, wall_factor
-from pipeline.run.calibration import Gathered, depth_offset, used_by
+from pipeline.run.calibrated import data_of
+from pipeline.run.calibration import Gathered, depth_offset
 from pipeline.run.provenance import code_state
 from pipeline.run.results import jsonable, write_json
 from pipeline.study.parameters import Parameters, read_parameters
@@ -74,7 +75,7 @@ def write_parameters(path: Path, found: Gathered, fit: Calibration) -> Parameter
         lines.append(f"stiffness_N_mm2 = {_text(stated * wall_factor(stated, values))}")
     for row in rows:
         lines += ["", "[[estimate]]", *(f"{key} = {_text(value)}" for key, value in row.items())]
-    for used, traces in zip(used_by(found), found.traced_mm, strict=True):
+    for used, traces in zip(_used_by(found), found.traced_mm, strict=True):
         lines += ["", "[[used]]", *(f"{key} = {_text(value)}" for key, value in used.items())]
         lines += ["traced_mm = [", *(f"  {_text(points.round(4).tolist())}," for points in traces), "]"]
     write_text(path, "\n".join(lines) + "\n")
@@ -157,7 +158,7 @@ def write_record(path: Path, found: Gathered, fit: Calibration) -> None:
         "starts": fit.fit.starts,
         "scale": fit.scale,
         "stated": fit.fit.problem.stated,
-        "used": used_by(found),
+        "used": _used_by(found),
         "warnings": [*misfit(fit), *flattened(found), *found.left_out],
         "notes": found.notes,
         "provenance": code_state(),
@@ -173,3 +174,9 @@ def write_design(path: Path, rows: list[Predicted], notes: tuple[str, ...]) -> N
         for p in rows
     ]
     write_json(path, jsonable({"schema": 1, "predicted": found, "notes": notes, "provenance": code_state()}))
+
+
+def _used_by(found: Gathered) -> list[dict[str, Any]]:
+    """The cases that were calibrated with, as parameters.toml names them."""
+    pairs = zip(found.cases, found.voxels, strict=True)
+    return [{"case": case.id, "group": case.group, "data": [*data_of(case), *voxels]} for case, voxels in pairs]

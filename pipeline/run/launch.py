@@ -1,9 +1,4 @@
-"""The whole run: every case of a manifest, and of every point of a sweep, into one output folder.
-
-A sweep is the same cases with one setting changed at a time, beside the plain result. Segmentation and tracing do not
-depend on the solver's settings, so the stage store answers them: a sweep costs simulation and comparison only. An
-agreement that no parameter moves is suspicious.
-"""
+"""The whole run: every case of a manifest, and of every point of a sweep, into one output folder."""
 
 import gc
 import math

@@ -11,10 +11,13 @@ SLAB_MM = 3.0
 
 def projections(volume: Volume, window: tuple[float, float]) -> tuple[NDArray[np.uint8], ...]:
     """Maximum-intensity projections along the three array axes, 8 bit within the grey-value ``window``."""
+    return tuple(shades(volume.values.max(axis=axis).astype(np.float32), window) for axis in range(3))
+
+
+def shades(values: NDArray[np.float32], window: tuple[float, float]) -> NDArray[np.uint8]:
+    """Grey values as 8 bit: 0 at the window's lower end and below, 255 at its upper end and above."""
     low, high = window
-    scale = 255.0 / max(high - low, 1e-9)
-    peaks = (volume.values.max(axis=axis).astype(np.float32) for axis in range(3))
-    return tuple(np.clip((peak - low) * scale, 0, 255).astype(np.uint8) for peak in peaks)
+    return np.asarray(np.clip((values - low) * (255.0 / max(high - low, 1e-9)), 0, 255).astype(np.uint8))
 
 
 def slabs(volume: Volume, point_mm: Array) -> tuple[NDArray[np.uint8], ...]:
@@ -28,7 +31,7 @@ def slabs(volume: Volume, point_mm: Array) -> tuple[NDArray[np.uint8], ...]:
     parts = [volume.values[tuple(s if a == axis else slice(None) for a in range(3))] for axis, s in enumerate(each)]
     peaks = [part.max(axis=axis).astype(np.float32) for axis, part in enumerate(parts)]
     low, high = np.percentile(np.concatenate([peak.ravel() for peak in peaks]), (1.0, 99.9))
-    return tuple(np.clip((peak - low) * (255.0 / max(high - low, 1e-9)), 0, 255).astype(np.uint8) for peak in peaks)
+    return tuple(shades(peak, (low, high)) for peak in peaks)
 
 
 def grey_window(volume: Volume, wire_mm: Array | None = None) -> tuple[float, float]:

@@ -5,6 +5,7 @@ from scipy.ndimage import map_coordinates
 
 from pipeline.arrays.polyline import at_arc, tangents
 from pipeline.model import Array, Volume, arc_length
+from pipeline.run.projections import shades
 from reports.frames_file import Straightened
 
 STEP_VOXELS = 0.75  # of the smallest side of a voxel: finer shows nothing more
@@ -29,10 +30,8 @@ def straightened(volume: Volume, curve_mm: Array, window: tuple[float, float]) -
     # every plane's points: (planes, samples along the first direction, along the second, 3)
     planes = offsets[:, None, None] * first[:, None, None] + offsets[:, None] * second[:, None, None]
     index = volume.to_index(at_arc(curve_mm, arc)[:, None, None] + planes)
-    low, high = window
-    values = map_coordinates(volume.values, np.moveaxis(index, -1, 0), np.float32, order=1, cval=low)
-    grey = np.clip((values - low) * (255.0 / max(high - low, 1e-9)), 0, 255)
-    return Straightened(grey.astype(np.uint8), along, across, first[0])
+    values = map_coordinates(volume.values, np.moveaxis(index, -1, 0), np.float32, order=1, cval=window[0])
+    return Straightened(shades(values, window), along, across, first[0])
 
 
 def _unit(vectors: Array) -> Array:

@@ -21,9 +21,8 @@ from reports.case_files import listed
 from reports.origin import why_not_pooled
 from reports.records import read_json
 from reports.schema import SWEEP
+from reports.sweep import UNCHANGED
 
-PLAIN = "(plain)"
-"""Stands where the name of the changed setting would."""
 AGAIN = "give the command with --sweep again"
 
 
@@ -152,7 +151,7 @@ def write_sweep(out: Path, heads: Sequence[Head], *, earlier: bool = False) -> s
         return f"{out / SWEEP.file}: removed, it belongs to an earlier run: {again}" * there
     before = with_another(out, found_cases(out))
     null = str(overall(before).get("strongest_null") or "")
-    rows = list(_rows({"parameter": PLAIN, "value": ""}, before, before, null))
+    rows = list(_rows({"parameter": UNCHANGED, "value": ""}, before, before, null))
     for head in heads:
         rows += _rows(head, before, _at(out, head, before), null)
     tables.write(out / SWEEP.file, SWEEP, rows)
@@ -186,7 +185,7 @@ def _row(
     null : the predictor that skill is measured against in all rows, the strongest one of the plain run.
     """
     row = {name: summary.get(name) for name in SWEEP.names} | head | {"case": summary["case"]}
-    found = None if head["parameter"] == PLAIN else ratio(before, after)
+    found = None if head["parameter"] == UNCHANGED else ratio(before, after)
     if found is not None:
         row |= {"rms_ratio": found.value, "rms_ratio_low": found.low, "rms_ratio_high": found.high}
     return intervals.fields(row | skill_beside(before, after, null))[0]

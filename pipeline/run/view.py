@@ -159,9 +159,8 @@ def closed_surface(grid: Grid) -> tuple[Array, NDArray[np.int64]]:
 def _write_lumen(folder: Path, lumen: Lumen) -> None:
     grid = lumen.distance
     inside = (grid.values < 0).astype(np.uint8)
-    export.write_segmentation_nrrd(
-        folder / "lumen.seg.nrrd", inside, grid.spacing_mm, grid.origin_mm, grid.direction, ("lumen",)
-    )
+    geometry = grid.spacing_mm, grid.origin_mm, grid.direction
+    export.write_segmentation_nrrd(folder / "lumen.seg.nrrd", inside, *geometry)
     if inside.any():
         surface = closed_surface(grid)
         export.write_surface_vtp(folder / "lumen.vtp", *surface)

@@ -23,15 +23,13 @@ from pydantic import (
 )
 from pydantic.config import JsonDict
 
-from pipeline.load.geometry import LoadError
-from pipeline.load.guard import read_toml, status_of
 from pipeline.model import OverWire, Uncertainty, Wall, Wire
-from pipeline.ranges import Axis, Depth, Direction, Finite, Name, NonNegative, Number, Point, Positive, Spread
+from pipeline.ranges import Axis, Depth, Direction, Finite, Name, NonNegative, Number, Point, Positive, Spread, Strict
 from pipeline.status import InputError, did_you_mean
 from pipeline.study.borrowed import borrowing_problems
 from pipeline.study.catheter import catheter_problems
 from pipeline.study.others import LONGEST_NAME, OthersText
-from pipeline.study.sources import MaskText, PathText, Sources, SourceText, Strict
+from pipeline.study.sources import MaskText, PathText, Sources, SourceText, read_tables
 from pipeline.wording import WRITTEN_HERE, Place, as_toml, said, saying, sentences
 
 
@@ -255,12 +253,7 @@ class Manifest:
 
 def read_manifest(path: Path) -> Manifest:
     """Read and check a manifest (not the scans); raises ManifestError with every problem found."""
-    try:
-        if status_of(path) is None:
-            raise ManifestError([f"{path}: no such manifest"])
-        data = read_toml(path)
-    except LoadError as error:
-        raise ManifestError([str(error)]) from None
+    data = read_tables(path, ManifestError, "no such manifest")
     context: dict[str, Any] = {"folder": path.parent}
     try:
         tables = ManifestTables.model_validate(data, context=context)

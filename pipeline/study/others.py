@@ -11,8 +11,9 @@ from pipeline.load.geometry import LoadError
 from pipeline.load.guard import is_folder, size_of, status_of
 from pipeline.load.order import natural_key
 from pipeline.load.wires import KINDS, kind_of
+from pipeline.ranges import Strict
 from pipeline.status import UsageError
-from pipeline.study.sources import NAMES, Sources, Strict
+from pipeline.study.sources import NAMES, Sources
 
 
 class Others(Strict):

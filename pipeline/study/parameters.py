@@ -5,16 +5,27 @@ nothing about the model, and is not scored unless that is asked for.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, StrictBool, ValidationError
+from pydantic import Field, StrictBool, ValidationError
 
-from pipeline.load.geometry import LoadError
-from pipeline.load.guard import read_toml, status_of
-from pipeline.ranges import Finite, FiniteProfile, Friction, NonNegative, Offset, Point, Positive, PositiveProfile, Turn
+from pipeline.ranges import (
+    Finite,
+    FiniteProfile,
+    Friction,
+    NonNegative,
+    Offset,
+    Point,
+    Positive,
+    PositiveProfile,
+    Strict,
+    Turn,
+)
 from pipeline.status import InputError
+from pipeline.study.sources import read_tables
 from pipeline.wording import said, sentences
 
 if TYPE_CHECKING:
@@ -22,20 +33,14 @@ if TYPE_CHECKING:
     from pipeline.study.manifest import Case
 
 
-class Table(BaseModel):
-    """Unknown keys are errors; values are frozen."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class WallFound(Table):
+class WallFound(Strict):
     """A wall as calibrated, known by the stiffness that the manifest states."""
 
     stated_N_mm2: Positive
     stiffness_N_mm2: Positive
 
 
-class Found(Table):
+class Found(Strict):
     """An estimate: a value with its standard deviation (of its logarithm where it is a factor), and what is used."""
 
     name: str
@@ -47,7 +52,7 @@ class Found(Table):
     why: str = ""
 
 
-class Stated(Table):
+class Stated(Strict):
     """The wire as the manifest stated it when it was calibrated."""
 
     bending_stiffness_N_mm2: PositiveProfile
@@ -60,7 +65,7 @@ class Stated(Table):
         return all(a.shape == b.shape and np.allclose(a, b, rtol=1e-4, atol=1e-9) for a, b in arrays)
 
 
-class Used(Table):
+class Used(Strict):
     """A case that was calibrated with.
 
     data : hashes of each of its frames and traces, and of its frames' voxels.     traced_mm : points (n, 3) on its
@@ -73,7 +78,7 @@ class Used(Table):
     traced_mm: tuple[Annotated[tuple[Point, ...], Field(min_length=1)], ...] = ()
 
 
-class Parameters(Table):
+class Parameters(Strict):
     """The whole file. bending_... and rest_... : of the wire, as profiles of the manifest."""
 
     schema_: Annotated[Literal[1], Field(alias="schema")]
@@ -103,13 +108,8 @@ class ParametersError(InputError):
 
 def read_parameters(path: Path) -> Parameters:
     """Read parameters.toml; raises ParametersError."""
-    try:
-        if status_of(path) is None:
-            what = "no such file; wireval calibrate MANIFEST -o OUT writes OUT/parameters.toml"
-            raise ParametersError([f"{path}: {what}"])
-        data = read_toml(path)
-    except LoadError as error:
-        raise ParametersError([str(error)]) from None
+    missing = "no such file; wireval calibrate MANIFEST -o OUT writes OUT/parameters.toml"
+    data = read_tables(path, ParametersError, missing)
     try:
         return Parameters.model_validate(data)
     except ValidationError as error:
@@ -129,8 +129,6 @@ def with_parameters(case: "Case", found: Parameters, data: Sequence[str], *, sco
     if found.stated is not None and not found.stated.is_of(case.wire):
         what = f"case {case.id!r}: wire {found.wire!r} is stated otherwise than when it was calibrated (table stated)"
         raise ParametersError([f"{what}; state it as then, give it another name, or calibrate it again"])
-    from dataclasses import replace
-
     profiles = {name: getattr(found, name) for name in ("bending_stiffness_N_mm2", "rest_curvature_per_mm")}
     stiffness = {w.stated_N_mm2: w.stiffness_N_mm2 for w in found.wall}.get(case.wall.stiffness_N_mm2)
     friction = case.wall.friction if "friction" in found.unseen else found.friction

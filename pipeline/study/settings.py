@@ -13,12 +13,11 @@ from pydantic import TypeAdapter, ValidationError
 
 from pipeline.budget.config import BudgetConfig
 from pipeline.compare.config import CompareConfig
-from pipeline.load import LoadError
 from pipeline.load.config import LoadConfig
-from pipeline.load.guard import read_toml, status_of
 from pipeline.segment.config import SegmentConfig
 from pipeline.simulate.config import SimulateConfig, SolverConfig
 from pipeline.status import InputError, did_you_mean
+from pipeline.study.sources import read_tables
 from pipeline.trace.config import TraceConfig
 from pipeline.wording import said, sentences
 from reports.texts import MalformedError, UnreadableError, toml_of
@@ -92,14 +91,8 @@ def parse_assignment(text: str, source: str = "command line") -> Setting:
 
 def read_settings(path: Path) -> list[Setting]:
     """All settings of a TOML file of tables."""
-    try:
-        if status_of(path) is None:
-            raise SettingsError([f"{path}: no such file; wireval settings prints one"])
-        data = read_toml(path)
-    except LoadError as error:
-        raise SettingsError([str(error)]) from None
     found: list[Setting] = []
-    for table, values in data.items():
+    for table, values in read_tables(path, SettingsError, "no such file; wireval settings prints one").items():
         if not isinstance(values, dict):
             raise SettingsError([f"{path}: {table!r} stands outside a table; write [solver] and the like above it"])
         found += [Setting(f"{table}.{key}", value, path.name) for key, value in values.items()]

@@ -5,12 +5,15 @@ import os
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationInfo, WithJsonSchema
+from pydantic import BeforeValidator, ValidationInfo, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
 from pipeline.load import Source
-from pipeline.load.geometry import Mask
+from pipeline.load.geometry import LoadError, Mask
+from pipeline.load.guard import read_toml, status_of
 from pipeline.load.order import natural_key
+from pipeline.ranges import Strict
+from pipeline.status import InputError
 from pipeline.wording import saying
 
 MOST_MATCHES, LONGEST_PATTERN, LONGEST_NAME = 20_000, 4000, 255
@@ -125,10 +128,14 @@ Sources = Annotated[tuple[Source, ...], BeforeValidator(_sources), WithJsonSchem
 PathText = Annotated[Path, BeforeValidator(lambda value, info: _source(value, info).path), WithJsonSchema(NAME)]
 
 
-class Strict(BaseModel):
-    """Unknown keys are errors; values are frozen."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
+def read_tables(path: Path, error: type[InputError], missing: str) -> dict[str, Any]:
+    """What a TOML file holds; raises ``error`` where it cannot be read, with ``missing`` where there is none."""
+    try:
+        if status_of(path) is None:
+            raise error([f"{path}: {missing}"])
+        return read_toml(path)
+    except LoadError as found:
+        raise error([str(found)]) from None
 
 
 def files_of(table: Strict, within: str = "") -> dict[str, Path]:

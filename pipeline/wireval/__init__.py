@@ -6,9 +6,10 @@
     results = wireval.run("study/manifest.toml", "out", jobs=2)
     results.errors.plot(x="insertion_mm", y="rms_mm")
 
-Here is no code of its own: ``synth``, ``check``, ``run``, ``score``, ``calibrate`` and ``diff`` are the verbs as
-typed, everything else is re-exported; other verbs (report, bench, ...) are on the command line alone. What cannot be
-used raises ``InputError`` (or ``StageError``, where a scan shows nothing to go by) with the sentences of the terminal.
+``synth``, ``check``, ``run``, ``score``, ``calibrate`` and ``diff`` do what the commands of these names do; all other
+commands (report, bench, ...) exist on the command line alone. Everything else here is defined in other packages and can
+be imported from this one, too. Input that cannot be used raises ``InputError``, and a scan in which nothing can be
+found raises ``StageError``; both say what the command would print.
 """
 
 import json
@@ -63,15 +64,18 @@ Settings = Mapping[str, bool | float | str | Sequence[object]]
 
 
 def synth(scene: str, out: Place, **more: bool | float | str) -> Path:
-    """A study with truth, as files; its manifest. more : options of ``wireval synth``, as ``frames=8``, ``seed=3``."""
+    """Write a synthetic study, whose true wires are known, and return the path of its manifest.
+
+    more : options of ``wireval synth``, such as ``frames=8`` or ``seed=3``.
+    """
     _carried_out("synth", scene, out=out, **more)
     return Path(out) / "manifest.toml"
 
 
 def check(manifest: Place, *, settings: Settings | None = None) -> list[str]:
-    """Every problem of a manifest, or of a folder of scans, each a sentence; empty where none is found.
+    """Every problem of a manifest, or of a folder of scans, as one sentence each; empty if none is found.
 
-    Headers are read, no voxels, except where a manifest is inferred from scans.
+    Only the headers of scans are read, not their voxels, unless a manifest has to be inferred from a folder of scans.
     """
     try:
         _carried_out("check", manifest, settings=settings)
@@ -92,16 +96,17 @@ def run(
     fail_if: str | Sequence[str] = (),
     **more: bool | str | Sequence[str],
 ) -> Results:
-    """Run the whole pipeline over every case of a manifest (or of a folder of scans) into a folder; the results.
+    """Run the whole pipeline over every case of a manifest (or of a folder of scans) and return the results.
 
-    settings : ``{"solver.segment_mm": 0.5}``, as --set takes them.     sweep : ``{"simulate.wall_scale": [0.5, 2]}``
-    runs again with each of these values.     fail_if : ``"rms_mm>0.5"``, or several; those that hold are told in
-    ``results.closed``, and ``results.ok`` is False.     more : any other option of ``wireval run`` by its long name, as
-    ``fresh=True``, ``only=["run1"]``, ``until="trace"``, ``quiet=True``.
+    out : the folder that they are written to.     settings : those that differ from the defaults, such as
+    ``{"solver.segment_mm": 0.5}``.     sweep : ``{"simulate.wall_scale": [0.5, 2]}`` repeats the run with each of these
+    values.     fail_if : a condition such as ``"rms_mm>0.5"``, or several; each one that holds is a sentence in
+    ``results.closed``, and ``results.ok`` is then False.     more : any other option of ``wireval run`` by its long
+    name, such as ``fresh=True``, ``only=["run1"]``, ``until="trace"`` or ``quiet=True``.
 
-    A frame or case that fails raises nothing: ``results.failures`` has its sentence. Running the same again keeps what
-    is finished; a shard that gets none of the cases leaves no files, and empty tables. Raises InputError where nothing
-    could be run.
+    A frame or a case that fails raises nothing; ``results.failures`` says why it failed. Running again into the same
+    folder keeps the cases that are finished. A shard without any case writes no files, and its tables are empty.
+    Raises InputError where nothing could be run.
     """
     points = [f"{name}={','.join(map(str, values))}" for name, values in (sweep or {}).items()]
     gates = [fail_if] if isinstance(fail_if, str) else list(fail_if)
@@ -117,12 +122,12 @@ def score(
     fail_if: str | Sequence[str] = (),
     **more: bool | int | str | Settings,
 ) -> Results:
-    """Judge other simulators' wires; the results of the first one.
+    """Compare the wires of other simulators with the traced ones; the results of the first simulator.
 
-    curves : ``"mine=DIR"``, several of these, or ``{"mine": DIR, ...}``.     fail_if : as for ``run``; asked of every
-    simulator, or of the one that is named (``"mine:rms_mm>0.5"``), told in ``results.closed``.     more : options of
-    ``wireval score``.
-    Those of the others: ``read_results(out / "simulators" / NAME)``.
+    curves : ``"mine=DIR"``, several of these, or ``{"mine": DIR, ...}``.     fail_if : as for ``run``, asked of every
+    simulator, or of the one that is named (``"mine:rms_mm>0.5"``); those that hold are in ``results.closed``.
+    more : options of ``wireval score``.
+    For the results of another simulator: ``read_results(out / "simulators" / NAME)``.
     """
     gates = [fail_if] if isinstance(fail_if, str) else list(fail_if)
     named = [f"{name}={place}" for name, place in curves.items()] if isinstance(curves, Mapping) else curves
@@ -132,15 +137,16 @@ def score(
 
 
 def calibrate(manifest: Place, out: Place, **more: bool | Settings) -> Path:
-    """Parameters from the cases whose role is calibration: the file that ``run`` takes. more : as for ``score``."""
+    """Fit parameters to the cases of role calibration; the file that ``run`` takes. more : as for ``score``."""
     _carried_out("calibrate", manifest, out=out, **more)
     return Path(out) / "parameters.toml"
 
 
 def diff(first: Place, second: Place, *, tolerance: Place | None = None) -> Verdict:
-    """Whether a second run, or score, became worse than a first one; InputError where they cannot be compared.
+    """Whether a second run (or score) is worse than a first one; InputError where they cannot be compared.
 
-    tolerance : TOML, column = allowed increase; a default ships.
+    tolerance : a TOML file with how much worse each column may become, ``rms_mm = 0.03``; by default the one that is
+    installed with wireval.
     """
     try:
         return compared(Path(first), Path(second), None if tolerance is None else Path(tolerance))

@@ -33,15 +33,15 @@ class Cases(dict[str, CaseFiles]):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Results:
-    """The tables of a run; the columns are those of the files, docs/reference/columns.md explains them.
+    """What a run wrote, as pandas frames. Their columns are explained in docs/reference/columns.md.
 
-    summary : a row a case.     overall : one row over all validation cases, with intervals.     errors : a row a frame,
-    of all cases.     failures : what is not ok, and why.     sweep : a row for each value of a sweep.
-    simulators, where : of a score, how good each one is, and which is nearest where.
-    cases : each case's folder, read: ``results.cases["run1"].read_frame(3).simulated_mm``.     closed : a sentence for
-    each ``fail_if`` of the run that holds, of a score for every simulator.     damaged : cases whose files are not as
-    they were written; their errors and points are left out.     other_tables : a sentence where summary.csv is not of
-    the cases beside it.
+    summary : one row per case.     overall : one row over all validation cases, with intervals.     errors : one row
+    per frame of every case.     failures : what has no result, and why.     sweep : one row per value of a sweep.
+    simulators, where : after a score: how good each simulator is, and which one is the nearest in which place.
+    cases : the folder of each case by its id: ``results.cases["run1"].read_frame(3).simulated_mm``.
+    closed : a sentence for each condition of ``fail_if`` that holds, after a score for every simulator.
+    damaged : cases whose files have changed since they were written; they are left out of errors and points.
+    other_tables : a sentence where summary.csv does not belong to the cases beside it, else empty.
     """
 
     out: Path
@@ -59,9 +59,7 @@ class Results:
 
     @property
     def ok(self) -> bool:
-        """Whether every case that was to be run is here, whole, all its frames ok, with the same settings; and no gate
-        closed.
-        """
+        """Whether every case has a whole result, all frames of it ok, of the same settings, and no gate is closed."""
         if (
             self.closed
             or self.damaged
@@ -101,7 +99,7 @@ class Results:
 def read_results(out: str | Path) -> Results:
     """Read the folder that ``wireval run`` wrote; raises InputError where it is none.
 
-    Warns of cases whose files are not as they were written, and of tables over all cases that are of others.
+    Warns of cases whose files have changed since they were written, and of tables that belong to other cases.
     """
     out = Path(out)
     if not out.is_dir():
@@ -154,7 +152,7 @@ def _alike(row: Mapping[Any, Any], other: Mapping[str, Any]) -> bool:
 
 
 def read_run(out: Path) -> Results:
-    """What a run has just left: nothing, in empty tables, where it was a shard that got none of the cases."""
+    """The results that a run has just written; empty tables where it was a shard without any case."""
     return read_results(out) if find_cases(out) else _results(out, {}, _closed(out))
 
 

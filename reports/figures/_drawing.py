@@ -72,12 +72,6 @@ class Drawing:
         return [_mark(self.figure, panel) for panel in self.frames]
 
 
-def frames_of(table: pd.DataFrame, column: str) -> dict[int, float]:
-    """The value of a column for every frame of a table that has one."""
-    known = table[table[column].notna()]
-    return {int(n): float(v) for n, v in zip(known["frame"], known[column], strict=True)}
-
-
 def _box(axes: Axes) -> list[float]:
     """Left, top, width and height of a panel, percent of the figure."""
     box = axes.get_position()

@@ -4,9 +4,7 @@ from collections.abc import Iterator
 from itertools import cycle
 from typing import Any
 
-from reports.colours import SIMULATED as SIMULATED
-from reports.colours import TRACED as TRACED
-from reports.colours import TRUE
+from reports.colours import SIMULATED, TRACED, TRUE
 from reports.schema import ERRORS
 
 Look = dict[str, Any]  # what matplotlib is told of a line, a legend, cells

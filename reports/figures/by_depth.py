@@ -11,7 +11,7 @@ from matplotlib.ticker import FuncFormatter, NullLocator
 
 from reports.case_files import CaseFiles
 from reports.colours import BAD, SIMULATED, TRACED
-from reports.figures._drawing import Drawing, FrameAxis, frames_of, from_zero, legend, new_figure, plain, positive_axis
+from reports.figures._drawing import Drawing, FrameAxis, from_zero, legend, new_figure, plain, positive_axis
 from reports.figures._style import GREY, SLATE, Look, lines, predictors
 from reports.schema import ERRORS
 from reports.tables import has
@@ -137,7 +137,9 @@ def _by_depth(table: pd.DataFrame) -> pd.DataFrame:
 
 def _depths(case: CaseFiles, *panels: Axes) -> list[FrameAxis]:
     """The depth of every frame, for these panels."""
-    return [FrameAxis(axes, frames_of(case.errors, "insertion_mm")) for axes in panels]
+    known = _by_depth(case.errors)
+    depths = {int(n): float(mm) for n, mm in zip(known["frame"], known["insertion_mm"], strict=True)}
+    return [FrameAxis(axes, depths) for axes in panels]
 
 
 def _table(case: CaseFiles, columns: Sequence[str]) -> pd.DataFrame:

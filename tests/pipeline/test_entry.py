@@ -185,7 +185,7 @@ def known_of(curves: Sequence[Curve]) -> tuple[Any, Any]:
     ]
     log = SimpleNamespace(warnings=[], assumptions=[])
     lumen = SimpleNamespace(distance=SimpleNamespace(spacing_mm=np.full(3, VOXEL_MM)))
-    return SimpleNamespace(case=case, log=log), SimpleNamespace(frames=frames, lumen=lumen)
+    return SimpleNamespace(case=case, log=log), SimpleNamespace(frames=frames, vessel=lumen)
 
 
 @pytest.mark.parametrize(
@@ -239,7 +239,7 @@ def test_a_clamp_that_is_turned_keeps_the_material_axis_that_was_not_stated() ->
         entry_sigma_mm=None, entry_direction_sigma_deg=2.0,
     )  # fmt: skip
     lumen = SimpleNamespace(distance=SimpleNamespace(spacing_mm=np.full(3, VOXEL_MM)))
-    given, _, _ = manifest_clamp(cast(Any, SimpleNamespace(case=case)), cast(Any, SimpleNamespace(lumen=lumen)))
+    given, _, _ = manifest_clamp(cast(Any, SimpleNamespace(case=case)), cast(Any, SimpleNamespace(vessel=lumen)))
     for tilts in ((0.0, 0.0), (-0.1, 0.05), (0.05, -0.1), (0.1, 0.1)):
         clamp = moved(given, np.array([0.0, 0.0, 0.0, *tilts]))
         first = base_frame(clamp.direction, clamp.material_axis, 0.0)[:, 0]

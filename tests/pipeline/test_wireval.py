@@ -13,7 +13,7 @@ import pytest
 
 import wireval
 from pipeline.cli import main
-from pipeline.run.sweep import PLAIN
+from reports.sweep import UNCHANGED
 from tests.pipeline.known_study import run_known, write_csv
 
 
@@ -51,7 +51,7 @@ def test_a_run_gives_frames(study: Path, tmp_path: Path) -> None:
     typed = json.loads((tmp_path / "out" / "provenance.json").read_text(encoding="utf-8"))["argv"]
     assert typed[:3] == ["wireval", "run", str(study)], "the next command names what was called"
     assert list(results.errors["case"]) == ["straight"] * 2
-    assert list(results.sweep["parameter"]) == [PLAIN, "simulate.wall_scale"]
+    assert list(results.sweep["parameter"]) == [UNCHANGED, "simulate.wall_scale"]
     assert results.cases["straight"].result["config"]["solver"]["segment_mm"]["value"] == 2.0
     assert len(results.cases["straight"].points) == len(results.points) > 0, "read when it is asked for"
     last = results.points[results.points["frame"] == 1]

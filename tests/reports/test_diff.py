@@ -49,7 +49,7 @@ def test_verdicts(change: dict[str, object], column: str, verdict: str) -> None:
     others = rows.drop(index=column)
     assert set(others["verdict"]) == ({"same"} if column != "status" else set()), "a frame that fails counts once"
     assert len(found.regressions) == (verdict == "regression")
-    assert len(found.closing) == (verdict in ("regression", "moved"))
+    assert found.rows["verdict"].isin(diff.CLOSING).sum() == (verdict in ("regression", "moved"))
     assert ("1 value has moved: insertion_mm" in found.sentence) == (verdict == "moved")
 
 
@@ -78,7 +78,7 @@ def test_a_recovered_frame_is_no_regression() -> None:
     """Nor has it moved: the depth that was stated gave way to the traced one, and a gate closed."""
     before = _table([{"frame": 0, "status": "no_wire", "insertion_mm": 30.0}])
     found = diff.diff_tables({"c": before}, {"c": _table([_row(insertion_mm=31.0)])}, TOLERANCE)
-    assert found.closing.empty
+    assert not found.rows["verdict"].isin(diff.CLOSING).any()
     assert found.sentence.endswith("no regression; 1 frame that failed is ok now: c frame 0")
     assert found.rows.set_index("column").loc["status", "verdict"] == "better"
 

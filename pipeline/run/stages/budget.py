@@ -105,16 +105,14 @@ class Work:
 
     def __init__(self, run: Context, known: Known, frames: Sequence[Frame]) -> None:
         config, case = run.config, run.case
-        assert known.lumen is not None
-        assert known.clamp is not None
         self.run, self.frames, self.numbers = run, frames, [frame.index for frame in frames]
-        self.voxel = float(np.mean(known.lumen.distance.spacing_mm))
+        self.voxel = float(np.mean(known.vessel.distance.spacing_mm))
         friction = case.wall.friction if config.simulate.friction is None else config.simulate.friction
         depth, roll = (np.array([getattr(f, name) for f in frames]) for name in ("depth_mm", "roll_deg"))
         traced = config.simulate.depth == "traced" and all(f.traced for f in frames)
-        self.nominal = Nominal(known.clamp, depth, roll, replace(config.simulate, friction=friction), traced)
+        self.nominal = Nominal(known.held, depth, roll, replace(config.simulate, friction=friction), traced)
         stated = {"roll_deg": case.roll_sigma_deg, **asdict(case.uncertainty)}
-        noise = known.lumen.levels.get("wall_noise_mm")
+        noise = known.vessel.levels.get("wall_noise_mm")
         self.sigmas = sigmas_of(stated, self.nominal, case.wire, self._depth_sigmas(), self.voxel, noise)
         self.seen = [self._seen(frame) for frame in frames]
         wires = [frame.simulated.joints_mm for frame in frames if frame.simulated is not None]
@@ -124,7 +122,7 @@ class Work:
         segment = lengths[0] if config.solver.segment_mm == "auto" else known.segment_mm
         solver = replace(config.solver, segment_mm=segment, finest_mm=config.solver.step_mm)
         tips = [frame.catheter_mm for frame in frames] if case.catheter else None
-        shared = case.wire, case.wall, known.lumen, solver, [*wires, *traces]
+        shared = case.wire, case.wall, known.vessel, solver, [*wires, *traces]
         self.scene = Scene(*shared, case.catheter, tips, config.budget.seed)
 
     def _depth_sigmas(self) -> Array:

@@ -10,15 +10,13 @@ from pipeline.run.stages.known import Context, Known
 
 def clues_of(run: Context, known: Known) -> Clues | None:
     """What predictors may know; None where no trace is to be trusted, or nothing will be compared."""
-    assert known.lumen is not None
-    assert known.clamp is not None
     if not run.goes_to("compare"):
         return None
     curves = [curve for frame in known.frames if (curve := frame.trusted_curve) is not None]
     if not curves:
         return None
     deepest = max(curves, key=lambda curve: curve.length_mm)
-    return Clues(known.lumen, known.clamp, run.case.wire.radius_mm, deepest.points_mm)
+    return Clues(known.vessel, known.held, run.case.wire.radius_mm, deepest.points_mm)
 
 
 def beside_clues(run: Context, known: Known, work: Callable[[int], R], count: int) -> list[R]:

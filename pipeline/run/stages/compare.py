@@ -158,15 +158,13 @@ def _tips_elsewhere(frames: Sequence[Frame], least_mm: float) -> dict[int, float
 
 def _rough_truth(known: Known) -> list[str]:
     """A warning of true wires whose points are so far apart that they cut corners."""
-    assert known.lumen is not None
     wires = {f.index: f.truth_mm for f in known.frames if f.truth_mm is not None}
-    return rough(wires, float(min(known.lumen.distance.spacing_mm)), "the true wires", "give a point every millimetre")
+    return rough(wires, float(min(known.vessel.distance.spacing_mm)), "the true wires", "give a point every millimetre")
 
 
 def _voxel_mm(known: Known) -> float:
     """The largest edge of the voxels of the lumen, without which nothing is compared."""
-    assert known.lumen is not None
-    return float(max(known.lumen.distance.spacing_mm))
+    return float(max(known.vessel.distance.spacing_mm))
 
 
 def _too_near(frames: Sequence[Frame], sample_mm: float, *, handed: bool) -> list[str]:
@@ -211,10 +209,9 @@ def _compared(run: Context, known: Known, frame: Frame, clues: Clues | None, see
     wire = frame.simulated_wire
     if frame.curve is None or not frame.traced or wire is None:
         return frame
-    assert known.lumen is not None
     settings, curve = run.config.compare, frame.curve
     ahead = 0.0 if known.clamp is None else ahead_of(known.clamp, curve)
-    errors = compare(wire, curve, known.lumen, settings, None if clues is None else clues.way, ahead)
+    errors = compare(wire, curve, known.vessel, settings, None if clues is None else clues.way, ahead)
     if clues is None:
         return replace(frame, comparison=errors)
     nulls = score(clues, frame.depth_mm, seen, curve.points_mm, settings)

@@ -70,8 +70,7 @@ def _depth(frame: Frame, clamp: Clamp, depth: str) -> float:
 
 def _pair(run: Context, known: Known, frame: Frame, wire: Solution, way: VesselAxis) -> Pair:
     assert frame.curve is not None
-    assert known.lumen is not None
-    return pair_of(wire, frame.curve, known.lumen, run.config.compare, way)
+    return pair_of(wire, frame.curve, known.vessel, run.config.compare, way)
 
 
 def _row(clamp: str, depth: str, pairs: Sequence[Pair]) -> dict[str, Any]:

@@ -37,8 +37,7 @@ def manifest_clamp(run: Context, known: Known) -> tuple[Clamp, Prior, float]:
     world axis may be the one least along it, and every roll would change by 90 degrees.
     """
     case = run.case
-    assert known.lumen is not None
-    voxel = float(np.mean(known.lumen.distance.spacing_mm))
+    voxel = float(np.mean(known.vessel.distance.spacing_mm))
     direction = np.array(case.entry_direction) / np.linalg.norm(case.entry_direction)
     least = np.eye(3)[int(np.argmin(np.abs(direction)))]
     axis = least if case.material_axis is None else np.array(case.material_axis)
@@ -51,13 +50,12 @@ def manifest_clamp(run: Context, known: Known) -> tuple[Clamp, Prior, float]:
 def trial_of(run: Context, known: Known, frames: Sequence[Frame], *, roll_free: bool) -> Trial:
     """The insertion as calibration takes it: the trusted traces of these frames, along their whole length."""
     case = run.case
-    assert known.lumen is not None
     given, prior, voxel_mm = manifest_clamp(run, known)
     trusted = [frame for frame in frames if frame.trusted_curve is not None]
     force = None if case.push_force_N is None else np.array([case.push_force_N[frame.index] for frame in trusted])
     return Trial(
         name=case.id,
-        vessel=VesselWall(known.lumen.distance, stiffness_N_mm2=1.0, hull=run.config.solver.hull),
+        vessel=VesselWall(known.vessel.distance, stiffness_N_mm2=1.0, hull=run.config.solver.hull),
         wire=case.wire,
         wall=case.wall,
         given=given,

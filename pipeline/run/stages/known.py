@@ -146,6 +146,18 @@ class Known:
     failed_stage: str = ""
     at_entry: ScanCrop | None = None
 
+    @property
+    def vessel(self) -> Lumen:
+        """The lumen, in a stage that runs only where one was found."""
+        assert self.lumen is not None
+        return self.lumen
+
+    @property
+    def held(self) -> Clamp:
+        """The clamp, in a stage that runs only where it is known."""
+        assert self.clamp is not None
+        return self.clamp
+
     def failed(self, stage: str, why: StageError) -> "Known":
         """The same case with what ended it, which is every frame's failure."""
         return replace(self, frames=tuple(f.failed(stage, why) for f in self.frames), failure=why, failed_stage=stage)

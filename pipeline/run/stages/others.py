@@ -45,9 +45,8 @@ def frames_of_others(run: Context, known: Known) -> tuple[Frame, ...]:
     log.assumptions.append(
         f"the simulated wires are another simulator's: {_listed(files)}; their depth counts from the clamp's plane"
     )
-    assert known.lumen is not None
     wires = {f.index: f.simulated.joints_mm for f in frames if f.simulated is not None}
-    voxel_mm = float(min(known.lumen.distance.spacing_mm))
+    voxel_mm = float(min(known.vessel.distance.spacing_mm))
     log.warnings += _in_another_order(frames)
     log.warnings += [*_outside(known, wires, case.wire.radius_mm), *_aside(frames)]
     log.warnings += rough(wires, voxel_mm, "the simulated wires", "give a point every millimetre")
@@ -79,8 +78,7 @@ def _in_another_order(frames: Sequence[Frame]) -> list[str]:
 
 
 def _taken(run: Context, known: Known, frame: Frame, file: OtherFile) -> Frame:
-    assert known.clamp is not None
-    case, clamp = run.case, known.clamp
+    case, clamp = run.case, known.held
     if file.points_mm is None:
         status = FrameStatus.CURVE_MISSING if file.missing else FrameStatus.CURVE_UNUSABLE
         return frame.failed("simulate", status, f"{file.name}: {file.problem}")
@@ -115,8 +113,7 @@ def _kinked(wires: Mapping[int, Array], wire: Wire) -> list[str]:
 
 def _clearance(known: Known, points: Array) -> Array:
     """Distance (n,) of equal steps along a wire to the lumen's wall, mm, negative inside."""
-    assert known.lumen is not None
-    return wall_of(known.lumen.distance, "offset").look_up(resample(points, STEP_MM))[0]
+    return wall_of(known.vessel.distance, "offset").look_up(resample(points, STEP_MM))[0]
 
 
 def _aside(frames: Sequence[Frame]) -> list[str]:

@@ -79,11 +79,10 @@ def _replayed(run: Context, known: Known) -> Known:
 def _resolved(run: Context, known: Known, frames: Sequence[Frame]) -> Resolved:
     """The wires of frames, with segments as short as needed; ValueError where the solver refuses its inputs."""
     config = run.config
-    assert known.lumen is not None
     lengths = lengths_mm(config.solver.segment_mm, altered(run.case.wire, config.simulate).rest_curvature_per_mm)
     # the first two lengths are needed in any case: side by side, where there are cores, the longer work first
     tries = [*((shorter, True) for shorter in lengths[1:2]), (lengths[0], len(lengths) == 1)]
-    wall_of(known.lumen.distance, config.solver.hull)  # made here, so that helpers inherit it
+    wall_of(known.vessel.distance, config.solver.hull)  # made here, so that helpers inherit it
     found = beside_clues(run, known, lambda i: _inserted(run, known, frames, *tries[i]), len(tries))
     ahead = dict(zip(tries, found, strict=True))
 
@@ -102,11 +101,9 @@ def _inserted(
 ) -> tuple[list[Solution], Log]:
     """The wires of frames with segments of one length, and a log. refined : repeat rough steps with shorter ones."""
     case, config, part = run.case, run.config, run.part()
-    assert known.lumen is not None
-    assert known.clamp is not None
     finest_mm = config.solver.finest_mm if refined else config.solver.step_mm
     settings = replace(config.solver, segment_mm=segment_mm, finest_mm=finest_mm)
-    shared = known.lumen, known.clamp, settings, config.simulate, case.catheter
+    shared = known.vessel, known.held, settings, config.simulate, case.catheter
     # a wire that is traced a little short of the catheter's tip ends with it
     tips = [min(f.catheter_mm, f.depth_mm) for f in frames] if case.catheter else None
     depths, rolls = [f.depth_mm for f in frames], [f.roll_deg for f in frames]

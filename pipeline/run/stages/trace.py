@@ -47,13 +47,12 @@ from pipeline.trace.saturated import cut_off, saturated
 def trace_frames(run: Context, known: Known) -> Known:
     """Every frame's wire, each with the previous one as a prior."""
     assert known.scans is not None
-    assert known.lumen is not None
     given = given_curves(run)
-    voxel_mm = float(np.min(known.lumen.distance.spacing_mm))
+    voxel_mm = float(np.min(known.vessel.distance.spacing_mm))
     if not known.scans.frames:
         if not given:
             return known
-        own = [as_given(run, *pair, known.lumen.distance) for pair in zip(known.frames, given, strict=True)]
+        own = [as_given(run, *pair, known.vessel.distance) for pair in zip(known.frames, given, strict=True)]
         run.log.warnings += rescanned(own, run.case.calibrated_traces)
         single = once(own, run.case.calibrated_scans, run.case.calibrated_traces)
         return _with_room(run, known, _in_step(run, single, voxel_mm))
@@ -68,7 +67,7 @@ def trace_frames(run: Context, known: Known) -> Known:
     run.log.warnings += doubtful_gaps
     frames = _in_step(run, turned_round(frames), voxel_mm)
     run.log.warnings += [*faint_ends(frames), *alike(frames), *rescanned(frames, run.case.calibrated_traces)]
-    run.log.warnings += too_thin(frames, known.lumen, run.case.wire.radius_mm)
+    run.log.warnings += too_thin(frames, known.vessel, run.case.wire.radius_mm)
     if not given:
         run.log.warnings += cut_off([(f.index, curve) for f in frames if (curve := f.trusted_curve) is not None])
     run.log.warnings += beside_what_is_seen(frames, [part.seen for part in parts], run.config.trace, voxel_mm)
@@ -98,11 +97,10 @@ def _in_step(run: Context, frames: list[Frame], voxel_mm: float) -> list[Frame]:
 
 def _with_room(run: Context, known: Known, frames: list[Frame]) -> Known:
     """The case with its frames, and a lumen that has room for their traces."""
-    assert known.lumen is not None
     curves = [curve for frame in frames if (curve := frame.trusted_curve) is not None]
     wire, wall = run.case.wire, run.case.wall
-    lumen = opened(known.lumen, curves, wire.radius_mm, wall.stiffness_N_mm2, given=run.case.lumen is not None)
-    run.log.warnings += lumen.warnings[len(known.lumen.warnings) :]
+    lumen = opened(known.vessel, curves, wire.radius_mm, wall.stiffness_N_mm2, given=run.case.lumen is not None)
+    run.log.warnings += lumen.warnings[len(known.vessel.warnings) :]
     run.lumen_known(lumen)
     return replace(known, frames=tuple(frames), lumen=lumen)
 
@@ -125,8 +123,7 @@ class _Tracing:
 
     def __init__(self, run: Context, known: Known, given: list[Curve]) -> None:
         assert known.scans is not None
-        assert known.lumen is not None
-        self.run, self.lumen, self.load, settings = run, known.lumen, run.config.load, run.config.trace
+        self.run, self.lumen, self.load, settings = run, known.vessel, run.config.load, run.config.trace
         self.frames, self.headers, self.given = known.frames, known.scans.frames, given
         self.corners = corners_mm(self.lumen.distance)
         self.box = known.scans.frames[0].box_of(self.corners)
