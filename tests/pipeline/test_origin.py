@@ -115,9 +115,7 @@ def test_shards_of_different_settings_are_not_pooled(
 ) -> None:
     out, words = tmp_path / "out", (str(tmp_path / "out"), "--overview")
     for shard, settings in (("1/2", ()), ("2/2", FINE)):
-        main(
-            ["run", str(study), "-o", str(tmp_path / shard[0]), "--until", "compare", "-q", "--shard", shard, *settings]
-        )
+        main(["run", str(study), "-o", str(tmp_path / shard[0]), *COMPARED, "--shard", shard, *settings])
         shutil.copytree(tmp_path / shard[0], out, dirs_exist_ok=True)
     capsys.readouterr()
     assert main(["report", *words, "--pdf"]) == 1
@@ -128,7 +126,7 @@ def test_shards_of_different_settings_are_not_pooled(
     assert "not pooled" in page
     assert pd.read_csv(out / "overall.csv").empty
     assert not wireval.read_results(out).ok
-    main(["run", str(study), "-o", str(tmp_path / "3"), "--until", "compare", "-q", "--shard", "1/2", *FINE])
+    main(["run", str(study), "-o", str(tmp_path / "3"), *COMPARED, "--shard", "1/2", *FINE])
     shutil.copytree(tmp_path / "3", out, dirs_exist_ok=True)
     assert main(["report", *words]) == 0
     assert why_not_pooled(out) == ""

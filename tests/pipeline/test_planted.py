@@ -37,11 +37,22 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def out(study: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def store(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What stages made of the study: a manifest that states another wire has the same lumen and the same traces."""
+    return tmp_path_factory.mktemp("store")
+
+
+@pytest.fixture(autouse=True)
+def _one_store(store: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("WIREVAL_CACHE", str(store))
+
+
+@pytest.fixture(scope="module")
+def out(study: Path, store: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("out")
     sweeps = [word for name, value in WRONG.items() for word in ("--sweep", f"{name}={value}")]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("WIREVAL_CACHE", str(tmp_path_factory.mktemp("store")))
+        patch.setenv("WIREVAL_CACHE", str(store))
         assert main(["run", str(study / "manifest.toml"), "-o", str(folder), "--until", "compare", *sweeps]) == 0
     return folder
 
@@ -120,10 +131,9 @@ def test_the_row_over_all_rests_on_the_insertions(out: Path) -> None:
     ],
 )
 def test_the_scans_speak_against_what_is_stated_wrongly(
-    study: Path, stated: str, wrong: str, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    study: Path, stated: str, wrong: str, said: str, tmp_path: Path
 ) -> None:
     """A catheter that no scan shows took the skill from 0.98 to 0.47 without a word."""
-    monkeypatch.setenv("WIREVAL_CACHE", str(tmp_path / "store"))
     text = (study / "manifest.toml").read_text(encoding="utf-8")
     assert stated in text
     manifest = study / "wrong.toml"
@@ -136,11 +146,8 @@ def test_the_scans_speak_against_what_is_stated_wrongly(
     assert all(said in text for text in found), found
 
 
-def test_a_reference_in_another_format_is_of_the_same_phantom(
-    study: Path, out: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_reference_in_another_format_is_of_the_same_phantom(study: Path, out: Path, tmp_path: Path) -> None:
     """It was known by its file's bytes: saved again, a verdict of no better than a guess became: that is better."""
-    monkeypatch.setenv("WIREVAL_CACHE", str(tmp_path / "store"))
     folder = shutil.copytree(study, tmp_path / "study")
     scan = sitk.ReadImage(str(folder / "1" / "reference.mha"))
     sitk.WriteImage(sitk.Cast(scan, sitk.sitkFloat32), str(folder / "other.nrrd"))

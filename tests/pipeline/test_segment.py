@@ -70,7 +70,7 @@ def test_a_vessel_whose_grey_is_cut_off_is_told(noise, darkest, spot):
     """A window narrower than the vessel is bright: its wall lay 0.4 voxel too far out, without a word."""
     curve, origin, clean = tube(2.0)
     grey = phantoms.scan(clean, 0.8, noise, seed=1)
-    window = np.clip(grey, darkest, phantoms.BACKGROUND + 540.0)
+    window = np.clip(grey, darkest, phantoms.BACKGROUND + 540.0).astype(np.float32)
     window[0, 0, 0] += 1000.0 * spot  # a single voxel is brighter, as of metal far away
     whole, cut = (segment(Volume(g, [VOXEL] * 3, origin), curve[[200]]) for g in (grey, window))
     off = {name: float(np.median(wall_error(lumen, curve, 2.0))) for name, lumen in (("whole", whole), ("cut", cut))}
@@ -93,7 +93,7 @@ def test_how_far_noise_moves_the_wall_is_said(radius, noise, correlation):
     rough = np.random.default_rng(1).standard_normal(clean.shape)
     rough = gaussian_filter(rough, correlation) if correlation else rough
     grey = phantoms.scan(clean, 0.8, 0.0, seed=1) + noise * rough / rough.std()
-    lumen = segment(Volume(grey, [VOXEL] * 3, origin), curve[[200]])
+    lumen = segment(Volume(grey.astype(np.float32), [VOXEL] * 3, origin), curve[[200]])
     error = wall_error(lumen, curve, radius)
     low, high = np.percentile(error, [16, 84])
     assert 0.5 < lumen.levels["wall_noise_mm"] / VOXEL / (0.5 * (high - low)) < 1.4

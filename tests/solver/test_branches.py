@@ -40,21 +40,20 @@ COPIES: list[Callable[[Insertion], Insertion]] = [
 
 
 @pytest.mark.parametrize("make", [straight, hooked, free])
-@pytest.mark.parametrize("duplicate", COPIES, ids=["clone", "deepcopy", "pickle"])
 @pytest.mark.parametrize("at", [[], [12.0], [0.4, 31.5, 26.0]], ids=["new", "pushed", "pulled"])
-def test_a_copy_goes_on_as_the_original_does(
-    make: Callable[[], Insertion], duplicate: Callable[[Insertion], Insertion], at: list[float]
-) -> None:
+def test_a_copy_goes_on_as_the_original_does(make: Callable[[], Insertion], at: list[float]) -> None:
+    """By ``clone``, ``deepcopy`` and ``pickle``, one beside the other; and as one of which nobody made a copy."""
     original, plain = make(), make()
     for _ in zip(original.to_depths(at, 20.0), plain.to_depths(at, 20.0), strict=True):
         pass
-    twin = duplicate(original)
-    assert (twin.depth_mm, twin.roll_deg) == (original.depth_mm, original.roll_deg)
+    twins = [duplicate(original) for duplicate in COPIES]
+    for twin in twins:
+        assert (twin.depth_mm, twin.roll_deg) == (original.depth_mm, original.roll_deg)
     # beyond the room that there was at first, back, and rolled
     depths, rolls = [33.3, 40.0, 38.0, 38.0, 5.0], [20.0, 20.0, 25.0, -30.0, -30.0]
-    for a, b, c in zip(*(i.to_depths(depths, rolls) for i in (original, twin, plain)), strict=True):
-        same_bits(a, b)
-        same_bits(a, c)
+    for first, *others in zip(*(i.to_depths(depths, rolls) for i in (original, *twins, plain)), strict=True):
+        for other in others:
+            same_bits(first, other)
 
 
 def test_a_clone_is_a_branch_of_its_own() -> None:
