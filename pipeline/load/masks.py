@@ -1,6 +1,6 @@
 """A lumen as voxels: a label map (one label of several by number or name), a layered .seg.nrrd, or probabilities.
 
-Out: a Volume of 0 and 1 (uint8), or of probabilities 0..1 (float32) whose wall is at 0.5.
+Out: a Volume of 0 and 1 (int16), or of probabilities 0..1 (float32) whose wall is at 0.5.
 """
 
 from collections.abc import Collection
@@ -23,6 +23,9 @@ from solver.grid import read_only
 FEW = 16
 """A map of whole numbers up to 255 with more distinct ones than this is a probability in 255 steps."""
 MOST_NAMED = 12
+WHOLE = np.int16
+"""What labels are given as: whole numbers as scans mostly hold them, for which the kernels are compiled. For bytes they
+took ten seconds, the first time."""
 
 
 def read_mask(source: Source, least_voxels: int) -> Volume:
@@ -107,14 +110,14 @@ def _chosen(path: Path, values: NDArray[Any], value: int | None, names: dict[str
             kinds = _different(values)
             others = f"{', '.join(f'{kind:g}' for kind in kinds[:MOST_NAMED])}{' ...' * (len(kinds) > MOST_NAMED)}"
             raise refused(path, f"no voxel of label {value}", f"one of its values, {others}", "name another label")
-        return chosen.astype(np.uint8)
+        return chosen.astype(WHOLE)
     low, high = float(values.min()), float(values.max())
     whole = values.dtype.kind in "iu" or bool(np.all(values == np.rint(values)))
     if not whole:
         return _probability(path, values, 0.5)
     kinds = _different(values)
     if len(kinds) == 2 and low == 0:
-        return np.asarray(values != 0).astype(np.uint8)
+        return np.asarray(values != 0).astype(WHOLE)
     if len(kinds) > FEW and low >= 0 and 200 <= high <= 255:
         return _probability(path, values, 0.5)
     shown = ", ".join(f"{kind:g}" for kind in kinds[:MOST_NAMED])

@@ -71,9 +71,6 @@ def lumen_from_surface(shapes: Shapes, config: SegmentConfig) -> Lumen:
 def lumen_from_labels(labels: Volume, config: SegmentConfig) -> Lumen:
     """A map of 0 and 1, or of probabilities 0..1; the wall is the half level after light smoothing."""
     grid, axes = in_memory_order(labels)
-    if grid.values.dtype == np.uint8:
-        # whole numbers as scans mostly hold them, for which the kernels are compiled: of bytes they took ten seconds
-        grid = grid.with_values(grid.values.astype(np.int16))
     order = np.flatnonzero(grid.values.reshape(-1) >= 0.5)
     site = prepare(grid, order, LABEL_TAPS, config.margin_mm)
     values = signed_distance(site, GreyLevels(1.0, 0.0, 0.0, (0.0,)), config.outer_mm).values

@@ -284,13 +284,11 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def out(study: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def out(study: Path, store: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("out")
     words = ["--set", "budget.members=24", "--set", "budget.members_alone=8", "--sweep", "simulate.taper_scale=1.1"]
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("WIREVAL_CACHE", str(tmp_path_factory.mktemp("store")))
-        assert main(["run", str(study / "manifest.toml"), "-o", str(folder), *words]) == 0
-        assert main(["run", str(study / "manifest.toml"), "-o", str(folder / "bare"), "--set", "budget.members=0"]) == 0
+    assert main(["run", str(study / "manifest.toml"), "-o", str(folder), *words]) == 0
+    assert main(["run", str(study / "manifest.toml"), "-o", str(folder / "bare"), "--set", "budget.members=0"]) == 0
     return folder
 
 

@@ -33,6 +33,8 @@ from pipeline.wireval import read_results
 from reports import atomic
 from tests.studies.trees import differences
 
+pytestmark = pytest.mark.usefixtures("one_store")
+
 
 @pytest.fixture(scope="module")
 def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
@@ -42,21 +44,9 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def store(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("store")
-
-
-@pytest.fixture(autouse=True)
-def _one_store(store: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("WIREVAL_CACHE", str(store))
-
-
-@pytest.fixture(scope="module")
 def whole(study: Path, store: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("whole")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("WIREVAL_CACHE", str(store))
-        assert run(study, out) == 0
+    assert run(study, out) == 0
     return out
 
 

@@ -24,6 +24,8 @@ from pipeline.run.exchanged import exchanged
 from pipeline.run.kin import told_of_kin
 from pipeline.run.overall import Found, found_cases, phantoms_of, strangers
 
+# a manifest that states another wire has the same lumen and the same traces
+pytestmark = pytest.mark.usefixtures("one_store")
 INSERTIONS, FRAMES = 3, 4
 WRONG = {"simulate.roll_offset_deg": "180", "simulate.rest_curvature_scale": "0"}
 
@@ -37,23 +39,10 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def store(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """What stages made of the study: a manifest that states another wire has the same lumen and the same traces."""
-    return tmp_path_factory.mktemp("store")
-
-
-@pytest.fixture(autouse=True)
-def _one_store(store: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("WIREVAL_CACHE", str(store))
-
-
-@pytest.fixture(scope="module")
 def out(study: Path, store: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("out")
     sweeps = [word for name, value in WRONG.items() for word in ("--sweep", f"{name}={value}")]
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("WIREVAL_CACHE", str(store))
-        assert main(["run", str(study / "manifest.toml"), "-o", str(folder), "--until", "compare", *sweeps]) == 0
+    assert main(["run", str(study / "manifest.toml"), "-o", str(folder), "--until", "compare", *sweeps]) == 0
     return folder
 
 
