@@ -10,8 +10,9 @@ from pipeline.trace.crests import BEND, Tracklet, find_crests
 from pipeline.trace.knots import CLOSEST, FIRST_BLUR, first_tube
 from pipeline.trace.link import Path, link, resampled, with_doubles
 from pipeline.trace.onward import beyond
-from pipeline.trace.profile import EVEN, ended
+from pipeline.trace.profile import ended
 from pipeline.trace.stated import Opacity, ended_as_stated
+from pipeline.trace.steps import EVEN
 from pipeline.trace.subtraction import Subtraction, numbered
 from pipeline.trace.tube import Tube, fit_tube, predicted
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from pipeline.model import Array, arc_length
 from pipeline.trace.link import resampled
-from pipeline.trace.profile import EVEN, Steps
+from pipeline.trace.steps import EVEN, Steps
 from pipeline.trace.subtraction import CREST_VOXELS, Subtraction
 from pipeline.trace.tube import Tube, spline_through, tint_nodes
 

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from pipeline.arrays.grids import unflattened
 from pipeline.model import Array, arc_length
 from pipeline.trace.attempt import dense
+from pipeline.trace.crest_profile import AHEAD_VOXELS, BACK_VOXELS
 from pipeline.trace.link import extended, resampled
-from pipeline.trace.profile import AHEAD_VOXELS, BACK_VOXELS
 from pipeline.trace.subtraction import Subtraction, numbered
 from pipeline.trace.tube import WINDOW, Tube
 

@@ -11,9 +11,9 @@ from scipy.ndimage import gaussian_filter1d
 
 from pipeline.model import Array, arc_length
 from pipeline.ranges import Profile
-from pipeline.trace.link import extended, resampled
-from pipeline.trace.profile import AHEAD_VOXELS, BACK_VOXELS, Steps
-from pipeline.trace.subtraction import CREST_VOXELS, Subtraction
+from pipeline.trace.crest_profile import AHEAD_VOXELS, BACK_VOXELS, CrestProfile
+from pipeline.trace.steps import Steps, best_end
+from pipeline.trace.subtraction import Subtraction
 
 RAMP = 0.1
 """Largest change of brightness (of its logarithm) from one piece of a ramp to the next."""
@@ -64,13 +64,9 @@ class Opacity:
         return Steps((high - edges[1:-1])[::-1] / length, level[::-1] / usual, stated=True, missing_mm=missing)
 
 
-def _best(opacity: Opacity, grey: Array, arc: Array, tries: Array, blur: float) -> float:
-    """The end, of several, at which the profile (its height free) fits the grey (n,) along the line best."""
-    shape = opacity.crests(tries[:, None] - arc[None], blur)
-    height = shape @ grey / np.maximum(np.sum(shape**2, axis=1), 1e-12)
-    cost = np.sum((grey - height[:, None] * shape) ** 2, axis=1)
-    cost[height <= 0] = np.inf
-    return float(tries[int(np.argmin(cost))])
+def _end(opacity: Opacity, grey: Array, arc: Array, tries: Array, blur: float) -> float:
+    """The end, of several, at which the stated profile (its height free) fits the grey (n,) along the line best."""
+    return best_end(tries, opacity.crests(tries[:, None] - arc[None], blur), grey)
 
 
 def ended_as_stated(image: Subtraction, points: Array, blur_mm: float, opacity: Opacity) -> tuple[Array, Steps]:
@@ -78,18 +74,14 @@ def ended_as_stated(image: Subtraction, points: Array, blur_mm: float, opacity: 
 
     Where that is further on than the path reaches, the path is left as it is: ``missing_mm`` of its steps says how far.
     """
-    h = image.voxel
-    step = 0.25 * h
-    line = resampled(extended(points, AHEAD_VOXELS * h, step), step)
-    arc, grey = arc_length(line), image.along(line)
-    blur = float(np.hypot(CREST_VOXELS * h, blur_mm))
+    crest = CrestProfile.of(image, points, blur_mm)
+    arc, grey, blur, h = crest.arc, crest.grey, crest.blur, crest.voxel
     furthest = float(arc[-1] + opacity.distance[-1])
-    end = _best(opacity, grey, arc, np.arange(arc[0] + 2 * h, furthest + 1e-9, TRIES * blur), blur)
+    end = _end(opacity, grey, arc, np.arange(arc[0] + 2 * h, furthest + 1e-9, TRIES * blur), blur)
     if end >= arc[-1]:
         own = float(arc[-1]) - AHEAD_VOXELS * h
-        return line[arc <= own], opacity.steps(own, end - own)
+        return crest.until(own), opacity.steps(own, end - own)
     near = (arc > end - BACK_VOXELS * h) & (arc < end + AHEAD_VOXELS * h)
     tries = np.clip(end + TRIES * blur * np.linspace(-2.0, 2.0, 41), arc[0] + 2 * h, arc[-1])
-    end = _best(opacity, grey[near], arc[near], tries, blur)
-    kept = line[arc <= end]
+    kept = crest.until(_end(opacity, grey[near], arc[near], tries, blur))
     return kept, opacity.steps(float(arc_length(kept)[-1]), 0.0)

@@ -11,7 +11,7 @@ from pipeline.model import Array, arc_length
 from pipeline.trace._kernels import tube as kernels
 from pipeline.trace._kernels.skyline import factorise, substitute
 from pipeline.trace._kernels.tube import Blob, Claim, Equations, Line, Samples
-from pipeline.trace.profile import EVEN, Steps
+from pipeline.trace.steps import EVEN, Steps
 from pipeline.trace.subtraction import Subtraction, numbered
 
 WINDOW = 3.0

@@ -21,7 +21,7 @@ from pipeline.trace.ends import (
     of_the_whole,
 )
 from pipeline.trace.link import extended, resampled
-from pipeline.trace.profile import LEAST_LEVEL, Steps
+from pipeline.trace.profile import LEAST_LEVEL
 from pipeline.trace.section import (
     Section,
     paired,
@@ -31,6 +31,7 @@ from pipeline.trace.section import (
     second_harmonic,
     section_along,
 )
+from pipeline.trace.steps import Steps
 from pipeline.trace.strands import BESIDE_VOXELS, DOUBLE, doubled, of_one_strand
 from pipeline.trace.subtraction import CREST_VOXELS, Subtraction
 from pipeline.trace.tube import Tube

@@ -15,7 +15,8 @@ from pipeline.arrays.jets import gaussian_taps, smooth_voxels
 from pipeline.model import Array, Curve, arc_length
 from pipeline.status import FrameStatus
 from pipeline.trace.attempt import dense
-from pipeline.trace.profile import BAND_VOXELS, INDEPENDENT_VOXELS, LEAST_LEVEL, UNEVEN, Steps
+from pipeline.trace.profile import BAND_VOXELS, INDEPENDENT_VOXELS, LEAST_LEVEL, UNEVEN
+from pipeline.trace.steps import Steps
 from pipeline.trace.subtraction import CREST_VOXELS, Subtraction
 from pipeline.trace.tube import Tube
 from pipeline.trace.verdict import note_of

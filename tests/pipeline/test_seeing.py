@@ -19,9 +19,9 @@ from pipeline.trace.attempt import EntryPose
 from pipeline.trace.config import TraceConfig
 from pipeline.trace.ends import sharpest_turn_deg
 from pipeline.trace.outside import seen_outside
-from pipeline.trace.profile import Steps
 from pipeline.trace.reach import end_range
 from pipeline.trace.section import carried
+from pipeline.trace.steps import Steps
 from pipeline.trace.subtraction import CREST_VOXELS, subtracted
 from pipeline.trace.tube import Tube, spline_through, tint_nodes
 from pipeline.trace.verdict import judge

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pipeline.study.manifest import read_manifest
-from pipeline.trace.stated import Opacity, _best
+from pipeline.trace.stated import Opacity, _end
 from tests.pipeline.test_manifest import GOOD, problems, written
 from tests.studies.seeing.scenes import CASES
 from tests.studies.seeing.table import look
@@ -50,7 +50,7 @@ def test_the_end_of_a_coil_tells_where_the_tip_is_even_where_that_is_not_seen(se
     assert opacity is not None
     arc = np.arange(0.0, seen, 0.075)
     grey = 100.0 * opacity.crests(end - arc, blur) + np.random.default_rng(1).normal(scale=10.0, size=len(arc))
-    assert abs(_best(opacity, grey, arc, np.arange(1.0, seen + 20.0, 0.5 * blur), blur) - end) < blur
+    assert abs(_end(opacity, grey, arc, np.arange(1.0, seen + 20.0, 0.5 * blur), blur) - end) < blur
 
 
 @pytest.mark.parametrize(
