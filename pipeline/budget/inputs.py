@@ -15,8 +15,6 @@ voxels); place by place by noise, where the lumen does not come from a scan, whi
 whole surface (measured: 0.03 at most)."""
 INSERTION_MM = 0.5
 """Standard deviation of a depth that is read from a scale on the wire's shaft."""
-TIP_VOXELS = 0.25
-"""Standard deviation of a traced tip along the wire, beyond what the trace states, as in ``simulate.clamp``."""
 ROLL_DEG = 5.0
 REST_CURVATURE, TAPER, WALL_STIFFNESS = 0.05, 0.1, 0.5
 """Relative standard deviations; the last two are of the logarithm."""

@@ -14,11 +14,12 @@ from scipy.linalg import cho_factor, cho_solve
 
 from pipeline.arrays.polyline import at_arc
 from pipeline.budget.frame import FEWEST, FrameSample
+from pipeline.budget.shapes import DISTAL_MM
 from pipeline.budget.verdict import axes_across
 from pipeline.model import Array
 from pipeline.simulate.evidence import TraceSamples, covariance_of_traces
 
-DISTAL_MM, DEGREE = 20.0, 3
+DEGREE = 3
 SHRUNK = 0.3
 """Weight of the diagonal in the shrunk covariance: 48 members do not determine 48 variances and their correlations."""
 NOTHING_MM2 = 1e-12

@@ -18,6 +18,7 @@ from pipeline.run.inputs import Inputs
 from pipeline.run.log import Log
 from pipeline.run.stages import Context, run_stages
 from pipeline.run.stages.given import trial_of
+from pipeline.run.stages.known import trusted
 from pipeline.run.stages.load import each_frame
 from pipeline.run.stages.repeated import kept
 from pipeline.status import InputError
@@ -98,7 +99,7 @@ def gathered(cases: Sequence[Case], config: Config, store: Store, say: Say) -> G
         trials.append(trial_of(run, known, known.frames, roll_free=case.roll_deg == "fit"))
         stated.append(np.array([frame.expected_mm for frame in frames]))
         voxels.append(tuple(frame.voxels for frame in known.frames if frame.voxels))
-        traced.append(tuple(kept(curve) for frame in frames if (curve := frame.trusted_curve) is not None))
+        traced.append(tuple(map(kept, trusted(frames).values())))
     if not trials:
         for note in notes:
             say(note)

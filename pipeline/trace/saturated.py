@@ -4,7 +4,7 @@ A wire's end is where its brightness has fallen to half. With its crest cut off,
 up to 1.7 voxels where a wire is several times as bright as the largest grey, 0.05 where its crest alone is cut off.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -36,9 +36,9 @@ def saturated(curve: Curve, volume: Volume) -> Curve:
     return replace(curve, tip_sigma_mm=sigma, levels={**curve.levels, LEVEL: share})
 
 
-def cut_off(curves: Sequence[tuple[int, Curve]]) -> list[str]:
-    """A warning that names the frames (number, curve) whose wire is brighter than their scans' greys go."""
-    found = {n: curve.levels[LEVEL] for n, curve in curves if LEVEL in curve.levels}
+def cut_off(curves: Mapping[int, Curve]) -> list[str]:
+    """A warning that names the frames whose wire is brighter than their scans' greys go. curves : by frame."""
+    found = {n: curve.levels[LEVEL] for n, curve in curves.items() if LEVEL in curve.levels}
     if not found:
         return []
     named = f"frame{'s' * (len(found) > 1)} {', '.join(map(str, found))}"

@@ -34,7 +34,7 @@ def test_a_crest_that_is_cut_off_is_said(top: float) -> None:
     seen = saturated(CURVE, clipped(scan(1000.0), top))
     assert seen.levels[LEVEL] > 0.8
     assert seen.tip_sigma_mm == pytest.approx(np.hypot(0.05, TIP_VOXELS * VOXEL))
-    (said,) = cut_off([(3, seen), (4, CURVE)])
+    (said,) = cut_off({3: seen, 4: CURVE})
     assert said.startswith("frame 3: up to")
     assert "export the scans with a wider window" in said
 
@@ -61,4 +61,4 @@ def test_a_crest_that_is_not_is_left_as_it_is(noise: float) -> None:
 def test_a_curve_without_points_has_no_crest() -> None:
     nothing = Curve(np.zeros((0, 3)), np.zeros(0))
     assert saturated(nothing, scan(1000.0)) is nothing
-    assert cut_off([(0, CURVE)]) == []
+    assert cut_off({0: CURVE}) == []

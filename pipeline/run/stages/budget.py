@@ -23,14 +23,14 @@ from pipeline.budget import (
     replayed,
 )
 from pipeline.budget.frame import FEWEST
-from pipeline.budget.inputs import INSERTION_MM, TIP_VOXELS, members_per_lumen, sigmas_of
-from pipeline.budget.joint import DISTAL_MM
+from pipeline.budget.inputs import INSERTION_MM, members_per_lumen, sigmas_of
+from pipeline.budget.shapes import DISTAL_MM
 from pipeline.budget.verdict import ROUND
 from pipeline.compare.metrics import rms, scored
 from pipeline.model import Array, arc_length
 from pipeline.run.stages.known import Context, Frame, Known
 from pipeline.simulate import altered
-from pipeline.simulate.clamp import ahead_of
+from pipeline.simulate.clamp import TIP_VOXELS, ahead_of
 from pipeline.simulate.evidence import UNKNOWN_VOXELS, TraceSamples
 from pipeline.simulate.resolution import lengths_mm
 

@@ -7,7 +7,7 @@ from pipeline.model import Clamp
 from pipeline.run.calibrated import data_of
 from pipeline.run.log import Log
 from pipeline.run.stages.given import manifest_clamp, seen_in
-from pipeline.run.stages.known import Context, Frame, Known
+from pipeline.run.stages.known import Context, Frame, Known, trusted
 from pipeline.run.stages.load import open_case
 from pipeline.run.stages.roll import with_fitted_roll
 from pipeline.run.stages.segment import segment_vessel
@@ -24,7 +24,7 @@ from solver import Solution
 def clamp_of(run: Context, known: Known) -> Clamp:
     """The clamp of the simulation: estimated from the scans, or the manifest's."""
     given, prior, voxel_mm = manifest_clamp(run, known)
-    seen = seen_in(known.frames) if any(frame.trusted_curve for frame in known.frames) else []
+    seen = seen_in(known.frames) if trusted(known.frames) else []
     passed = beside([frame.curve for frame in seen], given, prior.sigma_mm, voxel_mm)
     if run.config.simulate.entry == "manifest":
         run.log.warnings += [passed] * bool(passed)

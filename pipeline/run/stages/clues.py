@@ -5,14 +5,14 @@ from typing import Any
 
 from pipeline.compare.nulls import Clues
 from pipeline.run.helpers import R
-from pipeline.run.stages.known import Context, Known
+from pipeline.run.stages.known import Context, Known, trusted
 
 
 def clues_of(run: Context, known: Known) -> Clues | None:
     """What predictors may know; None where no trace is to be trusted, or nothing will be compared."""
     if not run.goes_to("compare"):
         return None
-    curves = [curve for frame in known.frames if (curve := frame.trusted_curve) is not None]
+    curves = trusted(known.frames).values()
     if not curves:
         return None
     deepest = max(curves, key=lambda curve: curve.length_mm)

@@ -120,6 +120,11 @@ class Frame:
         return replace(self, status=status.identifier, sentence=status.value, stage=stage, message=text)
 
 
+def trusted(frames: Sequence[Frame]) -> dict[int, Curve]:
+    """By the number of their frame, the traced curves that loading and tracing found nothing wrong with."""
+    return {frame.index: curve for frame in frames if (curve := frame.trusted_curve) is not None}
+
+
 Result = TypeVar("Result", Lumen, Curve)
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.model import Curve, Lumen
-from pipeline.run.stages.known import Frame
+from pipeline.run.stages.known import Frame, trusted
 from pipeline.status import FrameStatus
 from pipeline.trace.saturated import LEVEL
 
@@ -28,8 +28,7 @@ a head), its wall looks sharper (0.5) than a wire does, and each right trace the
 
 def too_thin(frames: Sequence[Frame], lumen: Lumen, radius_mm: float) -> list[str]:
     """A sentence where the blur of the traced wires leaves no room for the stated radius."""
-    curves = [curve for frame in frames if (curve := frame.trusted_curve) is not None]
-    blurs = [curve.levels["blur_mm"] for curve in curves if "blur_mm" in curve.levels]
+    blurs = [curve.levels["blur_mm"] for curve in trusted(frames).values() if "blur_mm" in curve.levels]
     if not blurs or 2.0 * radius_mm < LEAST_VOXELS * float(np.max(lumen.distance.spacing_mm)):
         return []
     seen = _seen_radius_mm(float(np.median(blurs)), lumen)

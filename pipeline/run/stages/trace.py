@@ -30,7 +30,7 @@ from pipeline.run.stages.depths import (
 )
 from pipeline.run.stages.dim_ends import faint_ends, own_dim_ends
 from pipeline.run.stages.gaps import own_gaps
-from pipeline.run.stages.known import Context, Frame, Known
+from pipeline.run.stages.known import Context, Frame, Known, trusted
 from pipeline.run.stages.own_curves import RESAMPLE, as_given, given_curves, rough
 from pipeline.run.stages.repeated import alike, once, rescanned
 from pipeline.run.stages.thickness import not_too_thick, too_thin
@@ -69,7 +69,7 @@ def trace_frames(run: Context, known: Known) -> Known:
     run.log.warnings += [*faint_ends(frames), *alike(frames), *rescanned(frames, run.case.calibrated_traces)]
     run.log.warnings += too_thin(frames, known.vessel, run.case.wire.radius_mm)
     if not given:
-        run.log.warnings += cut_off([(f.index, curve) for f in frames if (curve := f.trusted_curve) is not None])
+        run.log.warnings += cut_off(trusted(frames))
     run.log.warnings += beside_what_is_seen(frames, [part.seen for part in parts], run.config.trace, voxel_mm)
     run.log.warnings += work.wire_in_reference
     run.log.warnings += _in_plane(frames, run.config.trace)
@@ -90,16 +90,16 @@ def _in_step(run: Context, frames: list[Frame], voxel_mm: float) -> list[Frame]:
     frames = in_step(to_depth(frames, depths_mm, tolerance_mm), voxel_mm)
     run.log.warnings += [*shrinking(frames, voxel_mm), *standing(frames, voxel_mm)]
     if run.case.traces:
-        own = {f.index: curve.points_mm for f in frames if (curve := f.trusted_curve) is not None}
+        own = {index: curve.points_mm for index, curve in trusted(frames).items()}
         run.log.warnings += rough(own, voxel_mm, "the manifest's own curves", RESAMPLE)
     return frames
 
 
 def _with_room(run: Context, known: Known, frames: list[Frame]) -> Known:
     """The case with its frames, and a lumen that has room for their traces."""
-    curves = [curve for frame in frames if (curve := frame.trusted_curve) is not None]
     wire, wall = run.case.wire, run.case.wall
-    lumen = opened(known.vessel, curves, wire.radius_mm, wall.stiffness_N_mm2, given=run.case.lumen is not None)
+    curves, given = [*trusted(frames).values()], run.case.lumen is not None
+    lumen = opened(known.vessel, curves, wire.radius_mm, wall.stiffness_N_mm2, given=given)
     run.log.warnings += lumen.warnings[len(known.vessel.warnings) :]
     run.lumen_known(lumen)
     return replace(known, frames=tuple(frames), lumen=lumen)
