@@ -9,7 +9,7 @@ from pipeline.load.outside import UNITS_MM
 from pipeline.load.surfaces import SPACE, named_space, space_of
 
 HEAD = 4096  # bytes of a file of 3D Slicer or VTK in which it says what it is
-_UNIT = re.compile(r"(?:units?|coordinateUnits)\"?\s*[:=]\s*\"?([A-Za-zµμ]+)|lengths in (\w+)", re.IGNORECASE)
+_UNIT = re.compile(r"(?:units?|coordinateUnits)\"?\s*[:=,]\s*\"?([A-Za-zµμ]+)|lengths in (\w+)", re.IGNORECASE)
 _SPEAKS = re.compile(r"(?<![a-z])ras(?![a-z])|right[ _-]*anterior", re.IGNORECASE)
 
 

@@ -43,6 +43,24 @@ def test_another_space_is_refused(tmp_path: Path) -> None:
     assert "space LAS" in wire.problem
 
 
+@pytest.mark.parametrize("head", ["x_mm;y_mm;z_mm", "x_mm;y_mm;z_mm;force, N", "# of a wire; in mm\nx;y;z", "0;0;0"])
+def test_a_spreadsheet_with_decimal_commas_parts_cells_by_semicolons(tmp_path: Path, head: str) -> None:
+    path = tmp_path / "wire.csv"
+    more = ";0,1" * head.count("force")
+    path.write_text(f"{head}\n1,5;2,5;3{more}\n1,5;-2,5;1.25{more}\n", encoding="utf-8")
+    np.testing.assert_array_equal(read_curve(path).points_mm[-2:], [[1.5, 2.5, 3.0], [1.5, -2.5, 1.25]])
+    path.write_text(f"{head}\n1.234,5;2;3{more}\n", encoding="utf-8")
+    with pytest.raises(LoadError, match=r"1\.234\.5"):
+        read_curve(path)
+
+
+def test_a_unit_in_a_cell_of_its_own_is_a_unit(tmp_path: Path) -> None:
+    """Metres passed for mm."""
+    path = tmp_path / "wire.csv"
+    path.write_text("# unit,m\nx,y,z\n0,0,0\n0,0,0.05\n", encoding="utf-8")
+    np.testing.assert_allclose(read_curve(path).points_mm[-1], [0.0, 0.0, 50.0], rtol=1e-12)
+
+
 @pytest.mark.parametrize("head", ["x_mm,y_mm,z_mm\n", "0,0,0\n"])
 def test_decimal_commas_are_no_columns(tmp_path: Path, head: str) -> None:
     """Points at 1.5, 2.5, 3.1 were read as 1, 5, 2."""
