@@ -60,10 +60,7 @@ def background_scene(path: str | Path, voxel_mm: float | None = None) -> NamedSc
 def read_scan(path: Path, voxel_mm: float | None) -> tuple[Volume, ScanGrid]:
     """Grey values indexed x, y, z, and where they lie; ValueError for what is no volume of grey values."""
     try:
-        series = sitk.ImageSeriesReader.GetGDCMSeriesFileNames(str(path)) if path.is_dir() else str(path)
-        if path.is_dir():
-            _equally_far_apart(path, series)
-        image: Any = sitk.ReadImage(series)
+        image: Any = sitk.ReadImage(_only_series(path) if path.is_dir() else str(path))
     except RuntimeError:
         allowed = "a file that SimpleITK reads, or a folder with one DICOM series"
         raise ValueError(f"{path}: cannot be read as a volume; allowed: {allowed}; check the file") from None
@@ -79,6 +76,20 @@ def read_scan(path: Path, voxel_mm: float | None) -> tuple[Volume, ScanGrid]:
     if not np.all(np.isfinite(values)) or values.min() == values.max():
         raise ValueError(f"{path}: its grey values are NaN, infinite or all alike; allowed: a scan that shows a vessel")
     return values, ScanGrid(values.shape, spacing, np.array(image.GetOrigin()), direction)
+
+
+def _only_series(folder: Path) -> Sequence[str]:
+    """The slices of the one DICOM series in a folder, in order; ValueError for none or several, and for a stack that no
+    grid fits.
+    """
+    found = sitk.ImageSeriesReader.GetGDCMSeriesIDs(str(folder))
+    if len(found) != 1:
+        below = [f"{path.name}/" for path in sorted(folder.iterdir()) if path.is_dir()][:3]
+        look = f"; does one of its folders, as {', '.join(below)}, hold it?" if below and not found else ""
+        raise ValueError(f"{folder}: holds {len(found) or 'no'} DICOM series; allowed: one in a folder by itself{look}")
+    slices: Sequence[str] = sitk.ImageSeriesReader.GetGDCMSeriesFileNames(str(folder), found[0])
+    _equally_far_apart(folder, slices)
+    return slices
 
 
 def _equally_far_apart(folder: Path, slices: Sequence[str]) -> None:

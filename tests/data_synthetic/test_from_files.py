@@ -214,19 +214,34 @@ def test_a_study_is_named_as_a_manifest_may_name_a_case() -> None:
     assert name_after(Path(".nrrd")) == "scan"
 
 
-def test_slices_that_are_not_equally_far_apart_are_no_background(tmp_path: Path) -> None:
-    """They were stacked as if they were: a sheared head."""
+def slices_in(folder: Path, series: str, places_mm: tuple[float, ...]) -> None:
     writer = sitk.ImageFileWriter()
-    for number, z_mm in enumerate((0.0, 1.0, 2.0, 4.5)):
+    for number, z_mm in enumerate(places_mm):
         image = sitk.Image(20, 20, sitk.sitkInt16)
-        place = ("0020|000e", "1.2.3"), ("0020|0032", f"0\\0\\{z_mm}"), ("0020|0037", "1\\0\\0\\0\\1\\0")
+        place = ("0020|000e", series), ("0020|0032", f"0\\0\\{z_mm}"), ("0020|0037", "1\\0\\0\\0\\1\\0")
         for key, value in (("0008|0060", "CT"), *place, ("0020|0013", str(number))):
             image.SetMetaData(key, value)
-        writer.SetFileName(str(tmp_path / f"{number}.dcm"))
+        writer.SetFileName(str(folder / f"{series}-{number}.dcm"))
         writer.KeepOriginalImageUIDOn()
         writer.Execute(image)
+
+
+def test_slices_that_are_not_equally_far_apart_are_no_background(tmp_path: Path) -> None:
+    """They were stacked as if they were: a sheared head."""
+    slices_in(tmp_path, "1.2.3", (0.0, 1.0, 2.0, 4.5))
     with pytest.raises(ValueError, match="its slices are not equally far apart"):
         background_scene(tmp_path)
+
+
+def test_a_folder_of_several_series_is_no_background_nor_one_that_holds_them_deeper(tmp_path: Path) -> None:
+    """The first of several was taken; of a study's folder it was said that it "cannot be read as a volume"."""
+    (tmp_path / "head").mkdir()
+    with pytest.raises(ValueError, match=r"holds no DICOM series; .* does one of its folders, as head/, hold it\?"):
+        background_scene(tmp_path)
+    for series in ("1.2.3", "1.2.4"):
+        slices_in(tmp_path / "head", series, (0.0, 1.0))
+    with pytest.raises(ValueError, match="head: holds 2 DICOM series; allowed: one"):
+        background_scene(tmp_path / "head")
 
 
 def test_a_scan_without_room_for_a_vessel_is_refused(tmp_path: Path) -> None:
