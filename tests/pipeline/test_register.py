@@ -19,7 +19,6 @@ from pipeline.register.rigid import rigid
 from pipeline.register.shift import fit_motion, look, static_points
 from pipeline.segment import segment
 from solver import Grid
-from tests.later import later
 
 VOXEL = 0.5
 SKIP = 0.1
@@ -65,7 +64,7 @@ def off_by(found: Motion, true: Motion, points: np.ndarray) -> float:
     return float(np.linalg.norm(found.moved(points) - true.moved(points), axis=1).max()) / VOXEL
 
 
-@pytest.mark.parametrize(("voxels", "degrees"), [(0.3, 0.0), (7.0, 2.0), *later((1.0, 0.3), (3.0, 1.0))])
+@pytest.mark.parametrize(("voxels", "degrees"), [(0.3, 0.0), (1.0, 0.3), (3.0, 1.0), (7.0, 2.0)])
 def test_a_known_motion_is_found(study: Study, fixed: Anchor, voxels: float, degrees: float) -> None:
     true = a_motion(fixed.wall.centre_mm, voxels, degrees, seed=int(10 * voxels) + 100)
     found = register(scanned(study, true), fixed, SKIP)
