@@ -192,6 +192,7 @@ class VesselWall:
         if points.ndim != 2:
             refuse("wall", "points_mm", points.shape, "points (n, 3)", "reshape them")
         jets = np.zeros((len(points), 10))
-        look_up(self.field, points, jets)
+        # of points that cannot be written to, as a solution's joints are, it would be compiled once more: seconds
+        look_up(self.field, np.require(points, requirements=["C", "W"]), jets)
         order = [[4, 7, 8], [7, 5, 9], [8, 9, 6]]
         return jets[:, 0], jets[:, 1:4], jets[:, order]

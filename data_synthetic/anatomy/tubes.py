@@ -107,7 +107,7 @@ class Anatomy:
         """Signed distance (n,) and its gradient (n, 3)."""
         points = np.ascontiguousarray(np.atleast_2d(np.asarray(points_mm, dtype=np.float64)))
         values, gradients = np.empty(len(points)), np.empty((len(points), 3))
-        kernels.distances(points, self.tables, values, gradients)
+        kernels.distances(np.require(points, requirements=["C", "W"]), self.tables, values, gradients)
         return values, gradients
 
     def tube(self, name: str) -> Tube:

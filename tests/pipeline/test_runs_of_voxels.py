@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from pipeline.trace._kernels.runs import WallModel, denoised, runs_below
+from solver.grid import read_only
 
 TAPS = np.exp(-0.5 * np.arange(-2.0, 3.0) ** 2)
 
@@ -20,7 +21,7 @@ def lumen(seed: int, shape: tuple[int, int, int]) -> np.ndarray:
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("limit", [-0.8, 0.0, 1.5, 9.0, -9.0])
 def test_runs_are_every_voxel_below_the_limit_once(seed: int, limit: float) -> None:
-    values = lumen(seed, (7, 40, 19))  # more runs than the list begins with
+    values = read_only(lumen(seed, (7, 40, 19)))  # more runs than the list begins with
     runs = runs_below(values, limit)
     found = [(i, j, k) for i, j, first, stop in runs for k in range(first, stop)]
     assert found == [tuple(index) for index in np.argwhere(values < limit)]
@@ -31,7 +32,7 @@ def test_runs_are_every_voxel_below_the_limit_once(seed: int, limit: float) -> N
 def test_a_list_of_runs_grows() -> None:
     values = np.zeros((40, 40, 9), np.float32)
     values[..., ::2] = -1.0
-    assert len(runs_below(values, 0.0)) == 40 * 40 * 5
+    assert len(runs_below(read_only(values), 0.0)) == 40 * 40 * 5
 
 
 def smoothed(rough: np.ndarray, near: np.ndarray, variance: float) -> np.ndarray:
@@ -54,7 +55,7 @@ def test_the_residual_is_smoothed_near_the_lumen_alone(variance: float) -> None:
     rng = np.random.default_rng(8)
     distance = lumen(5, (8, 9, 11))
     rough = rng.normal(size=distance.shape) * rng.choice([0.3, 2.0], size=(8, 1, 1))
-    flat = WallModel(distance, runs_below(distance, 0.5), np.full(3, 100.0), 1.0)
+    flat = WallModel(distance, runs_below(read_only(distance), 0.5), np.full(3, 100.0), 1.0)
     out = np.zeros(distance.shape)
     denoised(rough, flat, TAPS, 0.5, variance, out)
     near = distance < 0.5

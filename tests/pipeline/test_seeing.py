@@ -27,6 +27,7 @@ from pipeline.trace.tube import Tube, spline_through, tint_nodes
 from pipeline.trace.verdict import judge
 from pipeline.trace.ways import SURE, brightest
 from pipeline.trace.whose_end import dim_from_tip_mm
+from tests.later import later
 from tests.numbers.kept import different
 from tests.numbers.traces import RELATIVE, numbers_of, word
 from tests.studies.seeing.known import FIRST, LARGE, REFUSED, TRACED
@@ -66,8 +67,7 @@ def test_what_cannot_be_told_is_refused(case, seed, status):
         assert "check that the frame shows a wire" in row.text
 
 
-@pytest.mark.parametrize("cnr", [10, 16])
-@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize(("seed", "cnr"), [(0, 10), (1, 16), *later((0, 16), (1, 10))])
 def test_a_marker_at_the_tip_is_seen_in_noise_beyond_what_is_not(seed: int, cnr: float):
     """In voxels of 0.4 mm too few of a marker's were bright enough: 7 mm of wire were missing, and ok."""
     draft = Draft(np.random.default_rng(seed), spacing=0.4, radius=2.0)
@@ -129,7 +129,7 @@ def test_a_dim_end_is_not_drawn_outwards_by_an_offset_common_to_bright_and_dim()
     assert row.text.startswith("though right"), "2.4 voxels too long with an offset"
 
 
-@pytest.mark.parametrize("seed", [0, 5])
+@pytest.mark.parametrize("seed", [0, *later(5)])
 def test_a_marker_band_does_not_draw_the_tip_to_itself(seed):
     row = look("marker band before the tip", seed)
     assert abs(row.tip) < 3.0, "stated standard deviations; 4.6 and 6.9 where the band is taken for noise"
@@ -146,7 +146,7 @@ def test_the_wall_lies_half_way_to_the_local_level(case):
     assert row.wall < 0.2, "voxel; 0.9 to 1.9 with one level for the whole vessel"
 
 
-@pytest.mark.parametrize(("voxels", "pitch_mm"), [(1.25, 8.0), (1.5, 6.0), (2.0, 12.0), (1.3, 4.0), (1.3, 3.0)])
+@pytest.mark.parametrize(("voxels", "pitch_mm"), [(1.25, 8.0), (2.0, 12.0), (1.3, 3.0), *later((1.5, 6.0), (1.3, 4.0))])
 def test_two_wires_turned_about_each_other_are_not_one(voxels, pitch_mm):
     """Traced midway, ok, 0.6 to 1.1 voxel off at a claimed 0.06 to 0.2: which way they lie apart was averaged away."""
     draft = Draft(np.random.default_rng(3), radius=2.2, wire_radius=0.18, room=0.9)
@@ -165,7 +165,7 @@ def test_two_wires_turned_about_each_other_are_not_one(voxels, pitch_mm):
     assert "out of round over" in curve.note or "one strand" in curve.note
 
 
-@pytest.mark.parametrize("seed", [1, 101])
+@pytest.mark.parametrize("seed", [101, *later(1)])
 def test_a_second_wire_that_is_a_copy_moved_aside_is_seen_in_part(seed):
     """Traced midway, ok, 0.4 to 0.5 voxel off: where the vessel turns the two lie behind each other, round as one."""
     rng = np.random.default_rng([seed, 7])
@@ -183,7 +183,7 @@ def test_a_second_wire_that_is_a_copy_moved_aside_is_seen_in_part(seed):
     assert "out of round over 10 mm" in curve.note
 
 
-@pytest.mark.parametrize("ratio", [1.1, 1.2])
+@pytest.mark.parametrize("ratio", [1.2, *later(1.1)])
 def test_a_scanner_that_is_sharper_across_its_axis_makes_no_pair_of_one_wire(ratio):
     """Blur that is a fifth larger along one axis refused every second wire as two in contact."""
     for seed in range(2):
@@ -213,7 +213,7 @@ def leaving(seed, leaves_mm, angle_deg):
     return draft
 
 
-@pytest.mark.parametrize(("leaves_mm", "angle_deg"), [(2.0, 80.0), (5.0, 80.0)])
+@pytest.mark.parametrize(("leaves_mm", "angle_deg"), [(2.0, 80.0), *later((5.0, 80.0))])
 def test_a_wire_that_leaves_the_lumen_through_its_wall_is_not_cut_there(leaves_mm, angle_deg):
     """Cut where grey is no longer read, four voxels outside: ok, 2 to 27 voxels short, a tip known to 0.04 mm."""
     for seed in (20, 21):
@@ -224,7 +224,7 @@ def test_a_wire_that_leaves_the_lumen_through_its_wall_is_not_cut_there(leaves_m
         assert curve.status is not FrameStatus.OK or short < 1.5 * scene.voxel
 
 
-@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("seed", [0, *later(1)])
 def test_a_wire_that_leaves_the_lumen_is_no_thin_vessel_of_a_frame_without_reference(seed):
     """In tissue it is as bright as contrast medium, and counted as lumen: cut where it leaves, 4 mm short, and ok."""
     scene = leaving(seed, 3.0, 80.0).scan(16, reference=False)
@@ -249,7 +249,7 @@ def test_a_tip_in_medium_that_is_washed_out_is_not_seen(seed, thinner, about_mm)
         assert "contrast medium about the curve's end that is darker than the reference's" in curve.note
 
 
-@pytest.mark.parametrize("step", [1.0, 1.3])
+@pytest.mark.parametrize("step", [1.3, *later(1.0)])
 def test_scans_in_coarse_steps_of_grey_are_no_copies(step):
     """Half of their voxels are alike by chance; no eight in a row are."""
     scene = Draft(np.random.default_rng(5)).scan(16)
@@ -294,7 +294,7 @@ def test_a_frame_of_which_a_part_is_the_reference_is_no_scan_of_the_wire(seed):
     assert ("of the lumen's voxels as the reference has them, to the last bit" in curve.note) == (seed != 2)
 
 
-@pytest.mark.parametrize("noises", [-10.0, -0.5, 0.5])
+@pytest.mark.parametrize("noises", [-10.0, 0.5, *later(-0.5)])
 def test_grey_that_is_counted_from_elsewhere_costs_no_wire(noises):
     """A reference without its intercept, or of a scanner that is not calibrated: half a noise lost every second."""
     scene = Draft(np.random.default_rng(1)).scan(8)
@@ -318,7 +318,7 @@ def narrow(seed, gain):
 
 
 @pytest.mark.parametrize("gain", [0.75, 1.0, 1.3])
-@pytest.mark.parametrize("seed", [4, 6])
+@pytest.mark.parametrize("seed", [4, *later(6)])
 def test_the_wire_is_not_taken_for_contrast_medium(seed, gain):
     """0.11 to 0.14 off by the median of a lumen of which the wire brightens more than half."""
     scene, lumen = narrow(seed, gain)

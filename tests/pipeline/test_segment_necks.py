@@ -9,6 +9,7 @@ from pipeline.model import Volume
 from pipeline.segment import segment
 from pipeline.segment.necks import closed_necks
 from solver.grid import Grid
+from tests.later import later
 from tests.studies.seeing import render
 
 H = 0.3
@@ -33,8 +34,8 @@ def depth(lumen, points):
     return grid.values[tuple(np.rint(grid.to_index(points)).astype(int).T)]
 
 
-@pytest.mark.parametrize("voxels", [0.7, 0.85, 1.0, 1.2])
-@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("voxels", [0.7, 1.2, *later(0.85, 1.0)])
+@pytest.mark.parametrize("seed", [0, *later(1)])
 def test_a_stenosis_does_not_end_the_lumen(voxels: float, seed: int) -> None:
     axis = straight(0.0, 0.0, 30.0)
     radius = 1.5 - (1.5 - voxels * H) * np.exp(-(((axis[:, 2] - 15.0) / 2.0) ** 2))

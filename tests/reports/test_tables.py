@@ -169,3 +169,29 @@ def test_extra_columns_are_kept_at_the_end(tmp_path: Path) -> None:
     pd.DataFrame({"mine": ["x"], "frame": [3]}).to_csv(path, index=False)
     back = tables.read(path, ERRORS)
     assert list(back.columns) == [*ERRORS_HEADER.split(","), "mine"]
+
+
+def test_rows_are_written_as_a_frame_of_them_is(tmp_path: Path) -> None:
+    """Rows are written without pandas: not one byte is another."""
+    texts = ["plain", "=formula", "-1.5", "- not a number", 'with, "marks"\nand lines', "'=held", "", None]
+    numbers = [-0.0, 1 / 3, 1e-12, 1e300, 7, math.nan, math.inf, np.float64(2.5)]
+    whole = [0, -3, None, np.int64(12), 10**12, 5, 6, 7]
+    said = [True, None, np.bool_(False), False, True, None, True, False]
+    of = {"text": texts, "float": numbers, "integer": whole, "boolean": said}
+    for table in (ERRORS, SUMMARY):
+        rows = [{c.name: of[c.kind][(n + k) % 8] for k, c in enumerate(table)} for n in range(8)]
+        del rows[1][table.names[3]]
+        frame = pd.DataFrame([dict(row) for row in rows], columns=list(table.names), dtype=object)
+        tables.write(tmp_path / "rows.csv", table, rows)
+        tables.write(tmp_path / "frame.csv", table, frame)
+        written = (tmp_path / "rows.csv").read_bytes()
+        assert written == (tmp_path / "frame.csv").read_bytes()
+        assert b"'=formula" in written
+        assert b",-0," not in written
+
+
+@pytest.mark.parametrize("row", [{"frame": 1.0}, {"frame": True}, {"rms_mm": "0.1"}, {"rms_mm": False}, {"status": 3}])
+def test_a_value_of_another_kind_is_refused_by_name(tmp_path: Path, row: dict[str, object]) -> None:
+    ((name, value),) = row.items()
+    with pytest.raises(ValueError, match=f"errors.csv: {name}: got {value!r}; allowed"):
+        tables.write(tmp_path / "errors.csv", ERRORS, [row])

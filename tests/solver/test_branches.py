@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from solver import Grid, GuideWire, Insertion, Solution, VesselWall
+from tests.later import later
 from tests.solver.scenes import bend_grid, fork_grid, same_bits
 
 HOOK = [[0, 0.12], [8, 0.12], [8, 0]]
@@ -40,7 +41,7 @@ COPIES: list[Callable[[Insertion], Insertion]] = [
 
 
 @pytest.mark.parametrize("make", [straight, hooked, free])
-@pytest.mark.parametrize("at", [[], [12.0], [0.4, 31.5, 26.0]], ids=["new", "pushed", "pulled"])
+@pytest.mark.parametrize("at", [[0.4, 31.5, 26.0], *later([], [12.0])], ids=["pulled", "new", "pushed"])
 def test_a_copy_goes_on_as_the_original_does(make: Callable[[], Insertion], at: list[float]) -> None:
     """By ``clone``, ``deepcopy`` and ``pickle``, one beside the other; and as one of which nobody made a copy."""
     original, plain = make(), make()
