@@ -6,6 +6,9 @@ directly or through others. ``solver`` and ``data_synthetic`` hold one copy each
 
 And numba numbers the files of a function's machine code: of two processes that compiled it for other types at one time,
 each might take the number 1, and what was kept for one's types was the other's code from then on.
+
+A function that only compiled code calls is optimised and turned into machine code where it is called from Python in
+the end (``part_of_callers``), not once more at every step of the way, which took a third of the time of compiling.
 """
 
 import functools
@@ -13,10 +16,11 @@ import hashlib
 import re
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, TypeVar, cast
+from typing import Any, NoReturn, TypeVar, cast
 
 import numba
-from numba.core import caching
+from llvmlite import binding
+from numba.core import caching, codegen, compiler, types
 
 F = TypeVar("F", bound=Callable[..., Any])
 PACKAGES = ("solver", "pipeline", "data_synthetic", "reports")
@@ -87,6 +91,38 @@ class _ByTypes(_Numbered):  # type: ignore[misc]
         return data if whose == (self._source_stamp, key) else None
 
 
+_Code: Any = codegen.JITCodeLibrary
+_Compiler: Any = compiler.Compiler
+_types: Any = types
+
+
+class _Part(_Code):  # type: ignore[misc]
+    """Code of a function that only compiled code calls: callers take it in as it stands and optimise it with their own.
+
+    By itself numba optimises it and makes machine code of it, and does both again in every caller of it and in theirs,
+    up to the one that Python calls: the only machine code that ever runs.
+    """
+
+    def _optimize_final_module(self) -> None:
+        self._finalized = True  # enough so for callers
+        code = self._get_module_for_linking()
+        environments = [v.name for v in code.global_variables if v.name.startswith("_ZN08NumbaEnv")]
+        # numba puts a function's environment where machine code has it
+        text = "\n".join(f'@"{name}" = common global ptr null' for name in environments)
+        self._final_module = binding.parse_assembly(text)
+        self._final_module.name = self.name
+
+
+class _PartCompiler(_Compiler):  # type: ignore[misc]
+    """Compile a function as a ``_Part``."""
+
+    def _compile_bytecode(self) -> Any:
+        state = self.state
+        state.library = _Part(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library.enable_object_caching()
+        return super()._compile_bytecode()
+
+
 def on_disk(**options: Any) -> Callable[[F], F]:
     """``numba.njit(**options)`` whose machine code is kept on disk for as long as no source behind it changes."""
 
@@ -95,6 +131,39 @@ def on_disk(**options: Any) -> Callable[[F], F]:
         if hasattr(compiled, "_cache"):  # a plain function where NUMBA_DISABLE_JIT is set
             stamp = hash_of(Path(function.__code__.co_filename))
             compiled._cache._cache_file = _ByTypes(compiled._cache._cache_file, stamp)
+        return cast(F, compiled)
+
+    return decorate
+
+
+def part_of_callers(how: Callable[..., Any] = numba.njit, **options: Any) -> Callable[[F], F]:
+    """``numba.njit(**options)`` for a function that only compiled code calls; ``how`` may be ``on_disk``.
+
+    It becomes machine code in its callers alone, without what Python would call it by: unpacking forty arrays takes
+    as long to compile as what is done with them.
+    """
+    options = dict(options, no_cpython_wrapper=True, no_cfunc_wrapper=True, pipeline_class=_PartCompiler)
+
+    def decorate(function: F) -> F:
+        compiled: Any = how(**options)(function)
+        if compiled is function:  # NUMBA_DISABLE_JIT is set
+            return function
+        template = compiled.get_call_template
+
+        def add(overload: Any) -> None:
+            compiled.overloads[tuple(overload.signature.args)] = overload
+
+        def refuse(*_: object, **__: object) -> NoReturn:
+            message = f"{function.__name__} is for compiled code: call an entry point, or write one in a test"
+            raise TypeError(message)
+
+        def unliteral(args: tuple[Any, ...], kws: Any) -> Any:
+            return template(tuple(_types.unliteral(arg) for arg in args), kws)
+
+        # numba would list the overload for Python all the same, and a call from there would end the process
+        compiled.add_overload, compiled._compile_for_args = add, refuse
+        # a literal argument is a type of its own to numba, and would compile the function once more
+        compiled.get_call_template = unliteral
         return cast(F, compiled)
 
     return decorate

@@ -80,6 +80,31 @@ def test_two_processes_that_compile_at_one_time_do_not_mix_their_code(package: s
     assert third.load(first) is None, "of a process that began before an edit"
 
 
+@pytest.mark.parametrize("package", COPIES)
+def test_a_part_of_callers_runs_in_them_alone(package: str, tmp_path: Path) -> None:
+    """Compiled here or read from the disk it computes, raises with its message, and is refused to Python."""
+    folder = tmp_path / package
+    folder.mkdir()
+    (folder / "__init__.py").touch()
+    (folder / "_compile.py").write_text((ROOT / package / "_compile.py").read_text(encoding="utf-8"))
+    head = f"from {package}._compile import on_disk, part_of_callers\n\n"
+    text = head + (
+        "@part_of_callers()\ndef root(x):\n    if x < 0:\n        raise ValueError('of', x)\n    return x**0.5\n\n"
+        "@part_of_callers(how=on_disk)\ndef kept(x):\n    return root(x) + 1.0\n\n"
+        "@on_disk()\ndef entry(x):\n    return kept(x)\n\n"
+        "def caller():\n    said = [entry(4.0)]\n    for function in (entry, root, kept):\n"
+        "        try:\n            function(-4.0)\n        except Exception as error:\n"
+        "            said.append((type(error).__name__, error.args[-1]))\n    return said\n"
+    )
+    (folder / "caller.py").write_text(text, encoding="utf-8")
+    refused = [
+        ("TypeError", f"{name} is for compiled code: call an entry point, or write one in a test")
+        for name in ("root", "kept")
+    ]
+    expected = str([3.0, ("ValueError", -4.0), *refused])
+    assert [called(tmp_path, package) for _ in range(2)] == [expected, expected]
+
+
 def called(folder: Path, package: str) -> str:
     code = f"from {package}.caller import caller; print(caller())"
     done = subprocess.run(

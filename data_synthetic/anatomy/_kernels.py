@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from data_synthetic._compile import on_disk
+from data_synthetic._compile import on_disk, part_of_callers
 from data_synthetic.geometry import Array, Index
 
 Vector = tuple[float, float, float]
@@ -37,7 +37,7 @@ class TubeTables(NamedTuple):
     block_starts: Index
 
 
-@on_disk()
+@part_of_callers()
 def ball_distance(
     p: Vector, s: float, first: int, step: float, tubes: TubeTables
 ) -> tuple[float, float, float, float, float, float]:
@@ -73,7 +73,7 @@ def ball_distance(
     return length - r, slope, vx, vy, vz, length
 
 
-@on_disk()
+@part_of_callers()
 def foot(p: Vector, sample: int, t: int, tubes: TubeTables) -> float:
     """Where f of tube t is least near ``sample``: the one zero of f' there (f is convex), by the Illinois method.
 
@@ -111,7 +111,7 @@ def foot(p: Vector, sample: int, t: int, tubes: TubeTables) -> float:
     return s
 
 
-@on_disk()
+@part_of_callers()
 def nearest_sample(p: Vector, t: int, limit: float, tubes: TubeTables) -> int:
     """The sample of tube t whose ball is nearest; -1 when the tube is certainly further away than ``limit``."""
     first, last, step = tubes.starts[t], tubes.starts[t + 1], tubes.steps[t]
@@ -130,7 +130,7 @@ def nearest_sample(p: Vector, t: int, limit: float, tubes: TubeTables) -> int:
     return sample
 
 
-@on_disk()
+@part_of_callers()
 def tube_distance(p: Vector, t: int, limit: float, tubes: TubeTables) -> tuple[float, float, float, float]:
     """Signed distance to tube t and its gradient; FAR when it is certainly above ``limit``."""
     first, step = tubes.starts[t], tubes.steps[t]
@@ -147,7 +147,7 @@ def tube_distance(p: Vector, t: int, limit: float, tubes: TubeTables) -> tuple[f
     return f, vx / length, vy / length, vz / length
 
 
-@on_disk()
+@part_of_callers()
 def union_distance(p: Vector, limit: float, tubes: TubeTables) -> tuple[float, float, float, float]:
     """Signed distance of the smooth union and its gradient; tubes certainly above ``limit`` are not looked at."""
     value, gx, gy, gz = FAR, 0.0, 0.0, 0.0
@@ -175,7 +175,7 @@ def distances(points: Array, tubes: TubeTables, out: Array, gradients: Array) ->
         gradients[i, 0], gradients[i, 1], gradients[i, 2] = gx, gy, gz
 
 
-@on_disk()
+@part_of_callers()
 def room_for(tubes: TubeTables) -> TubeTables:
     """Tables that ``tubes_around`` writes into; where its runs of samples fill no block, each has one of its own."""
     return TubeTables(
@@ -191,7 +191,7 @@ def room_for(tubes: TubeTables) -> TubeTables:
     )
 
 
-@on_disk()
+@part_of_callers()
 def samples_around(p: Vector, reach: float, t: int, limit: float, tubes: TubeTables) -> tuple[int, int]:
     """The first sample of tube t, and the one after the last, that may count within ``reach`` of p; none: (0, 0)."""
     first, last = tubes.starts[t], tubes.starts[t + 1]
@@ -216,7 +216,7 @@ def samples_around(p: Vector, reach: float, t: int, limit: float, tubes: TubeTab
     return max(low - 1, first), min(high + 2, last)
 
 
-@on_disk()
+@part_of_callers()
 def tubes_around(p: Vector, reach: float, limit: float, tubes: TubeTables, room: TubeTables) -> TubeTables:
     """The part of the tables that gives the distance within ``reach`` of p, where it is below ``limit``."""
     count = samples = blocks = 0

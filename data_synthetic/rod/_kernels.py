@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from data_synthetic._compile import on_disk
+from data_synthetic._compile import on_disk, part_of_callers
 from data_synthetic.geometry import Array, Index
 
 Vector = tuple[float, float, float]
@@ -47,38 +47,38 @@ class Shape(NamedTuple):
     directors: Array
 
 
-@on_disk()
+@part_of_callers()
 def dot(a: Vector, b: Vector) -> float:
     """Scalar product."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@on_disk()
+@part_of_callers()
 def cross(a: Vector, b: Vector) -> Vector:
     """Vector product."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-@on_disk()
+@part_of_callers()
 def plus(a: Vector, b: Vector) -> Vector:
     """Sum."""
     return a[0] + b[0], a[1] + b[1], a[2] + b[2]
 
 
-@on_disk()
+@part_of_callers()
 def row(values: Array, i: int) -> Vector:
     """Row i of an array (n, 3)."""
     return values[i, 0], values[i, 1], values[i, 2]
 
 
-@on_disk()
+@part_of_callers()
 def transport(m: Vector, a: Vector, b: Vector) -> Vector:
     """Vector m, normal to unit a, carried by the smallest rotation that takes unit a to unit b."""
     f = dot(m, b) / (1.0 + dot(a, b))
     return m[0] - f * (a[0] + b[0]), m[1] - f * (a[1] + b[1]), m[2] - f * (a[2] + b[2])
 
 
-@on_disk()
+@part_of_callers()
 def moved_edge(q: Array, k: int, tangent: Vector, director: Vector) -> tuple[float, Vector, Vector]:
     """Length, tangent and director 1 of the edge ``q[k:k+3]``, turned by ``q[k+3]`` from its tangent and director."""
     x, y, z = q[k], q[k + 1], q[k + 2]
@@ -90,7 +90,7 @@ def moved_edge(q: Array, k: int, tangent: Vector, director: Vector) -> tuple[flo
     return length, t, (c * a[0] + s * b[0], c * a[1] + s * b[1], c * a[2] + s * b[2])
 
 
-@on_disk()
+@part_of_callers()
 def vertex(q: Array, v: int, shape: Shape, rod: Elastic, g: Array, want_gradient: bool) -> float:
     """Energy of vertex v and its gradient g (8,) for q = (edge before, its angle, edge after, its angle)."""
     le, e, a = moved_edge(q, 0, row(shape.tangents, v), row(shape.directors, v))
@@ -126,7 +126,7 @@ def vertex(q: Array, v: int, shape: Shape, rod: Elastic, g: Array, want_gradient
     return energy
 
 
-@on_disk()
+@part_of_callers()
 def load_vertex(points: Array, angles: Array, introducer: Array, v: int, q: Array) -> None:
     """Fill q with the edges and angles around vertex v."""
     for a in range(3):
@@ -149,7 +149,7 @@ def elastic_energy(points: Array, angles: Array, shape: Shape, rod: Elastic) -> 
     return total
 
 
-@on_disk()
+@part_of_callers()
 def scatter(v: int, g: Array, h: Array, gradient: Array, bands: Array) -> None:
     """Add the local gradient (8,) and Hessian (8, 8) of vertex v to the system."""
     full = LOCAL.T @ h @ LOCAL
@@ -161,7 +161,7 @@ def scatter(v: int, g: Array, h: Array, gradient: Array, bands: Array) -> None:
             bands[i - j, first + j] += full[i, j]
 
 
-@on_disk()
+@part_of_callers()
 def bend_and_twist(q: Array, v: int, shape: Shape, rod: Elastic, g: Array, h: Array) -> None:
     """Fill gradient g (8,) and Hessian h (8, 8) of vertex v; h by central differences of the exact gradient."""
     gp, gm = np.zeros(8), np.zeros(8)
@@ -214,7 +214,7 @@ def add_blocks(bands: Array, low: Index, high: Index, block: Array) -> None:
                     bands[row + a - column - b, column + b] += block[n, a, b]
 
 
-@on_disk()
+@part_of_callers()
 def set_edge(tangents: Array, directors: Array, j: int, t: Vector, a: Vector) -> None:
     """Tangent t and director a of edge j, made orthonormal again, so that rounding cannot pile up."""
     along = dot(a, t)

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from data_synthetic._compile import on_disk
+from data_synthetic._compile import on_disk, part_of_callers
 from data_synthetic.anatomy._kernels import FAR, TubeTables, room_for, tubes_around, union_distance
 from data_synthetic.anatomy.tubes import Anatomy
 from data_synthetic.geometry import Array, Index, ScanGrid, Volume, arc_lengths, at_arc, voxels_near
@@ -90,7 +90,7 @@ def fill_coverage(
         out[n] = share_inside(p, offsets, reach, limit, near)
 
 
-@on_disk()
+@part_of_callers()
 def share_inside(p: Array, offsets: Array, reach: float, limit: float, tubes: TubeTables) -> float:
     """Share inside of a voxel that the wall crosses; arguments as of ``fill_coverage``."""
     # within a sub-voxel the wall is taken as a plane: no grain where it is parallel to a face

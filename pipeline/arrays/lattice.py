@@ -9,15 +9,13 @@ import mmap
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import DTypeLike, NDArray
 
-from solver._compile import on_disk
+from solver._compile import on_disk, part_of_callers
 
-HOW: dict[str, Any] = {"no_cfunc_wrapper": True}
-entry_point = on_disk(nogil=True, **HOW)
+entry_point = on_disk(nogil=True, no_cfunc_wrapper=True)
 """Compiles what Python calls: kept on disk until a source behind it changes; others may run beside it (``cores``)."""
-kernel = njit(**HOW)
+kernel = part_of_callers()
 """Compiles what other kernels call: into the entry points."""
 
 

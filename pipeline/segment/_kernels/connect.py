@@ -109,7 +109,7 @@ def _flat(s: Search, cells: NDArray[Any]) -> NDArray[Any]:
 
 
 @kernel
-def _affinity(cells: NDArray[Any], homogeneity: NDArray[Any], feature: NDArray[Any], here: int, to: int) -> float:
+def _affinity(cells: NDArray[Any], homogeneity: NDArray[Any], feature: NDArray[Any], here: Any, to: int) -> float:
     """Affinity, 0 to 255, between a voxel of grey level ``here`` and that of the cell ``to``; -1 if the cell is SEEN.
 
     Takes arrays instead of a Search: both searches spend their time here, and would take five times as long.
