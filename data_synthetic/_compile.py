@@ -106,9 +106,8 @@ class _Part(_Code):  # type: ignore[misc]
     def _optimize_final_module(self) -> None:
         self._finalized = True  # enough so for callers
         code = self._get_module_for_linking()
-        environments = [v.name for v in code.global_variables if v.name.startswith("_ZN08NumbaEnv")]
         # numba puts a function's environment where machine code has it
-        text = "\n".join(f'@"{name}" = common global ptr null' for name in environments)
+        text = "\n".join(str(v) for v in code.global_variables if v.name.startswith("_ZN08NumbaEnv"))
         self._final_module = binding.parse_assembly(text)
         self._final_module.name = self.name
 
