@@ -3,7 +3,6 @@
 Out: a Volume of 0 and 1 (int16), or of probabilities 0..1 (float32) whose wall is at 0.5.
 """
 
-from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,7 @@ from pipeline.load.config import LoadConfig
 from pipeline.load.files import head_of
 from pipeline.load.geometry import Header, Mask, Source, judged, refused
 from pipeline.load.guard import told
-from pipeline.load.voxels import Head, plain, read_box
+from pipeline.load.voxels import Head, Names, plain, read_box
 from pipeline.model import Volume
 from pipeline.status import did_you_mean
 from solver.grid import read_only
@@ -32,7 +31,7 @@ def read_mask(source: Source, least_voxels: int) -> Volume:
     """The lumen among the voxels of a file; LoadError where it is not clear which, or fewer than ``least_voxels``."""
     label, level = (source.label, source.level) if isinstance(source, Mask) else (None, None)
     volume, names = _voxels(source, label)
-    path, value = source.path, names[label][1] if isinstance(label, str) else label
+    path, value = source.path, names[label][0][1] if isinstance(label, str) else label
     inside = _chosen(path, volume.values, value, names) if level is None else _probability(path, volume.values, level)
     count = int(np.count_nonzero(inside >= 0.5))
     if count < least_voxels:
@@ -60,12 +59,15 @@ def _is_nrrd(path: Path) -> bool:
     return path.name.lower().endswith((".nrrd", ".nhdr"))
 
 
-def _require_label(source: Source, names: Collection[str], kind: np.dtype[Any]) -> None:
+def _require_label(source: Source, names: Names, kind: np.dtype[Any]) -> None:
     """LoadError for a label by a name that the file has not, or by a number that no voxel of its type can be."""
     label = source.label if isinstance(source, Mask) else None
     if isinstance(label, str) and label not in names:
         hint = did_you_mean(label, names) if names else "the file names none; give a number"
         raise refused(source.path, f"no label named {label!r}", "one that the file names", hint)
+    if isinstance(label, str) and len(names[label]) > 1:
+        values = " and ".join(str(value) for _, value in names[label])
+        raise refused(source.path, f"labels {values}, all named {label!r}", "one", "rename them, or give a number")
     # whole numbers may be stored with a factor, but not in NRRD
     if isinstance(label, int) and kind.kind in "iu" and _is_nrrd(source.path):
         least, most = np.iinfo(kind).min, np.iinfo(kind).max
@@ -79,8 +81,8 @@ def _header(source: Source, head: Head) -> Header:
     return Header(source, head.shape, *geometry, str(head.kind), head.items, head.assumed)
 
 
-def _voxels(source: Source, label: int | str | None) -> tuple[Volume, dict[str, tuple[int, int]]]:
-    """The voxels of the layer that holds a label, and (layer, value) of the file's labels by their names."""
+def _voxels(source: Source, label: int | str | None) -> tuple[Volume, Names]:
+    """The voxels of the layer that holds a label, and the file's labels by their names."""
     path = source.path
     header = mask_header(source)
     head = head_of(path) if _is_nrrd(path) else None
@@ -89,7 +91,8 @@ def _voxels(source: Source, label: int | str | None) -> tuple[Volume, dict[str, 
         raise refused(path, f"{header.item_count} volumes", "one label map", "save the one that is meant")
     if head is None or head.channels == 1:
         return load(header, config=LoadConfig()), names
-    found = [names[label]] if isinstance(label, str) else [n for n in names.values() if label in (None, n[1])]
+    every = [one for several in names.values() for one in several]
+    found = names[label] if isinstance(label, str) else [one for one in every if label in (None, one[1])]
     if len(found) != 1:
         allowed = f"one of {', '.join(sorted(names)[:MOST_NAMED]) or 'none'}"
         raise refused(path, f"{head.channels} layers, label {label!r}", allowed, "give label by its name")
@@ -97,13 +100,13 @@ def _voxels(source: Source, label: int | str | None) -> tuple[Volume, dict[str, 
         raise refused(path, f"a segment in layer {found[0][0]} of {head.channels}", "a layer it has", "save it again")
     values = plain(read_box(head, 0, header.box, found[0][0]), path)
     where = Volume(read_only(values), header.spacing_mm, header.origin_mm, header.direction, header.assumed)
-    return where, {**names, **({} if label is not None else {"": found[0]})}
+    return where, {**names, **({} if label is not None else {"": found})}
 
 
-def _chosen(path: Path, values: NDArray[Any], value: int | None, names: dict[str, tuple[int, int]]) -> NDArray[Any]:
+def _chosen(path: Path, values: NDArray[Any], value: int | None, names: Names) -> NDArray[Any]:
     """1 where the voxels have the label; if none is given, 1 where the only label is, or the map's probabilities."""
     if value is None and "" in names:
-        value = names[""][1]
+        value = names[""][0][1]
     if value is not None:
         chosen = np.asarray(values == value)
         if not chosen.any():
@@ -121,7 +124,8 @@ def _chosen(path: Path, values: NDArray[Any], value: int | None, names: dict[str
     if len(kinds) > FEW and low >= 0 and 200 <= high <= 255:
         return _probability(path, values, 0.5)
     shown = ", ".join(f"{kind:g}" for kind in kinds[:MOST_NAMED])
-    named = f" ({', '.join(f'{name} = {n[1]}' for name, n in list(names.items())[:MOST_NAMED])})" if names else ""
+    each = [f"{name} = {one[1]}" for name, several in names.items() for one in several]
+    named = f" ({', '.join(each[:MOST_NAMED])})" if names else ""
     got = f"{len(kinds)} different values, {shown}{named}"
     do = 'name one, lumen = {file = "...", label = 2}, or a probability, lumen = {file = "...", level = 0.5}'
     raise refused(path, got, "0 and one label", do)
@@ -140,7 +144,7 @@ def _different(values: NDArray[Any]) -> NDArray[Any]:
 def _probability(path: Path, values: NDArray[Any], level: float) -> NDArray[np.float32]:
     """Values 0..1 or 0..255 as probabilities, stretched so that ``level`` becomes 0.5."""
     low, high = float(values.min()), float(values.max())
-    if low < -1e-3 or high > 255.5 or 1.001 < high < 100:
+    if low < -1e-3 or high > 255.5 or 1.001 < high <= 100:
         raise refused(path, f"values from {low:g} to {high:g}", "0 to 1, or 0 to 255", "name a label, or rescale it")
     share = np.clip(values.astype(np.float32) / np.float32(255.0 if high > 1.001 else 1.0), 0, 1)
     return np.asarray(np.interp(share, (0.0, level, 1.0), (0.0, 0.5, 1.0)), np.float32)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pipeline.load.geometry import unusable
 from pipeline.load.guard import opened, size_of
 from pipeline.load.outside import beside, millimetres, numbered, numbers, said_twice
-from pipeline.load.voxels import Head, Placed, axes_of
+from pipeline.load.voxels import Head, Names, Placed, axes_of
 
 LONGEST_HEADER = 4 * 2**20
 _NAMES = {
@@ -193,13 +193,13 @@ def _geometry(path: Path, fields: dict[str, str], vectors: list[Any], leading: i
     )
 
 
-def _segments(fields: dict[str, str]) -> dict[str, tuple[int, int]]:
-    """(layer, label value) of every segment of 3D Slicer by its name."""
-    found = {}
+def _segments(fields: dict[str, str]) -> Names:
+    """Every segment of 3D Slicer by its name."""
+    found: Names = {}
     for key, name in fields.items():
         match = re.fullmatch(r"(Segment\d+_)Name", key)
         if match:
             layer, value = (fields.get(match[1] + part, one) for part, one in (("Layer", "0"), ("LabelValue", "1")))
             if layer.isdecimal() and value.isdecimal():
-                found[name] = (int(layer), int(value))
+                found.setdefault(name, []).append((int(layer), int(value)))
     return found

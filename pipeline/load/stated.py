@@ -10,6 +10,12 @@ from pipeline.load.surfaces import SPACE, named_space, space_of
 
 HEAD = 4096  # bytes of a file of 3D Slicer or VTK in which it says what it is
 _UNIT = re.compile(r"(?:units?|coordinateUnits)\"?\s*[:=,]\s*\"?([A-Za-zµμ]+)|lengths in (\w+)", re.IGNORECASE)
+_SPACE_OF = re.compile(
+    r"(?<![a-z])(?:(?:space|coordinate[ _-]?system)\"?\s*[:=,]\s*\"?([a-z]\w*)"
+    r"|(?:coordinates|orientation|axes)\"?\s*[:=,]\s*\"?([RLAPSI]{3})\b)",
+    re.IGNORECASE,
+)
+"""Any word that is given as the space: SPACE knows some."""
 _SPEAKS = re.compile(r"(?<![a-z])ras(?![a-z])|right[ _-]*anterior", re.IGNORECASE)
 
 
@@ -41,8 +47,16 @@ def stated_in_table(path: Path, rows: Sequence[Sequence[str]], comments: Sequenc
     if spoken and not spaces:
         why = f"a line speaks of RAS ({spoken.strip()[:60]!r}), but the space is taken from '# space: RAS' alone"
         raise unusable(path, f"{why}; write it so, or '# space: LPS' if that is what it is in")
+    _require_known(path, [line for line in comments if not SPACE.search(line)])
     _require_one(path, spaces, units, default)
     return named_space(spaces[0]) if spaces else default[0], units[0] if units else default[1]
+
+
+def _require_known(path: Path, comments: Sequence[str]) -> None:
+    """LoadError for a space that is none of an anatomy's, as voxels are: its numbers passed for LPS mm."""
+    named = [match[1] or match[2] for line in comments for match in _SPACE_OF.finditer(line)]
+    if other := next((name for name in named if name.upper() != "LPS"), None):
+        raise refused(path, f"space {other}", "LPS or RAS", "write the points in one of these, and '# space: LPS'")
 
 
 def _require_one(path: Path, spaces: Sequence[re.Match[str]], named: list[str], default: tuple[str, str]) -> None:

@@ -24,6 +24,10 @@ Placed = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
 """Spacing (3,), origin (3,) and direction (3, 3) in LPS mm."""
 
 
+Names = dict[str, list[tuple[int, int]]]
+"""Layer and value of the labels of each name: 3D Slicer lets several have one."""
+
+
 @dataclass(frozen=True, eq=False)
 class Head:
     """What a header says, in LPS mm.
@@ -49,7 +53,7 @@ class Head:
     slope: float = 1.0
     intercept: float = 0.0
     assumed: tuple[str, ...] = ()
-    names: dict[str, tuple[int, int]] = field(default_factory=dict)
+    names: Names = field(default_factory=dict)
 
     @property
     def plane_bytes(self) -> int:

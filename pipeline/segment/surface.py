@@ -187,7 +187,7 @@ def signed_distance(site: Site, levels: GreyLevels, outer_mm: float, filled: Fil
     if not good.any():
         got = f"got no place where smoothed grey is {level:.0f}, half way between the vessel and its surroundings"
         do = "the vessel is thinner than its blur: scan with smaller voxels, or set segment.scale = 0"
-        raise failed(got, "a surface", do)
+        raise failed(got, "a surface", f"{do}; or a wire lies at entry_mm: name a reference without one")
     seen = voxels[good]
     owner.reshape(-1)[seen] = np.flatnonzero(good) + 1
     own = good.copy()

@@ -334,10 +334,12 @@ def test_the_budget_moves_nothing_and_a_sweep_pays_for_none(out: Path) -> None:
 
 
 def test_an_ensemble_that_is_too_small_says_so(study: Path, tmp_path: Path) -> None:
-    words = ["-o", str(tmp_path), "--until", "compare", "--set", "budget.members=4", "--set", "budget.members_alone=0"]
+    words = ["-o", str(tmp_path), "--until", "compare", "--set", "budget.members=4", "--set", "budget.members_alone=2"]
     assert main(["run", str(study / "manifest.toml"), *words, "--set", "compare.simulated_nulls=false"]) == 0
     assert tables.read(tmp_path / "cases/bend/errors.csv", ERRORS)["u_val_mm"].isna().all()
-    assert "fewer than 90 % of the 4 insertions" in (tmp_path / "cases/bend/result.json").read_text(encoding="utf-8")
+    said = (tmp_path / "cases/bend/result.json").read_text(encoding="utf-8")
+    assert "fewer than 90 % of the 4 insertions" in said
+    assert "budget.members_alone = 2: of fewer than 8 insertions" in said
 
 
 def test_the_table_by_source_adds_up_and_the_four_entries_are_there(out: Path) -> None:

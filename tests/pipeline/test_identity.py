@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import shutil
 from pathlib import Path
 
 import h5py
@@ -70,6 +72,18 @@ def test_the_files_that_are_read_are_those_that_belong_to_the_key(
         assert file_hash(tmp_path / name) != before
     assert np.all(load(header, header.box).values != values), "they are what was read"
     assert sorted(parts_of(tmp_path / name)) == sorted(tmp_path / file for file in files)
+
+
+def test_a_file_in_anothers_place_with_its_size_and_time_is_another(tmp_path: Path) -> None:
+    """A scan put there by cp -p between two runs of one notebook: the second had the first one's curve, ok."""
+    for name, content in (("thin", b"thin"), ("wide", b"wide"), ("kept", b"thin")):
+        (tmp_path / name).write_bytes(content)
+        os.utime(tmp_path / name, ns=(0, 0))
+    before = file_hash(tmp_path / "thin")
+    shutil.copy2(tmp_path / "wide", tmp_path / "thin")  # into the same inode, with the time of the copy's original
+    assert file_hash(tmp_path / "thin") != before
+    (tmp_path / "kept").replace(tmp_path / "thin")
+    assert file_hash(tmp_path / "thin") == before
 
 
 def test_datasets_labels_and_levels_belong_to_keys(tmp_path: Path) -> None:

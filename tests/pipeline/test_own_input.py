@@ -174,6 +174,15 @@ def test_a_probability_has_its_wall_at_a_half(tmp_path, top):
     assert np.median(wider) < -0.1
 
 
+@pytest.mark.parametrize("kind", [np.float32, np.uint8])
+def test_percent_are_no_probability_of_255(tmp_path, kind):
+    """With a level of 0.3 the wall lay at 76.5 per cent, ok."""
+    distance, voxel, origin = capsule()
+    labels(tmp_path / "p.nrrd", np.round(100 / (1 + np.exp(distance / 0.15))).astype(kind), voxel, origin)
+    with pytest.raises(LoadError, match="values from 0 to 100; expected 0 to 1, or 0 to 255; name a label, or rescale"):
+        mask(tmp_path / "p.nrrd", level=0.3)
+
+
 def test_layers_and_names_of_a_segmentation(tmp_path):
     """3D Slicer puts segments that overlap into layers, which stand beside each other voxel by voxel."""
     distance, voxel, origin = capsule()
@@ -193,6 +202,11 @@ def test_layers_and_names_of_a_segmentation(tmp_path):
         mask(tmp_path / "s.seg.nrrd")
     with pytest.raises(LoadError, match="did you mean 'artery'"):
         mask(tmp_path / "s.seg.nrrd", label="atery")
+    both_artery = head.replace("Name:=core", "Name:=artery")
+    (tmp_path / "t.seg.nrrd").write_bytes(both_artery.encode() + b"\n" + both.tobytes(order="F"))
+    with pytest.raises(LoadError, match="labels 1 and 5, all named 'artery'"):
+        mask(tmp_path / "t.seg.nrrd", label="artery")
+    assert errors(mask(tmp_path / "t.seg.nrrd", label=5), within=0.3) is not None
 
 
 def test_a_centreline_of_vmtk(tmp_path):

@@ -54,6 +54,21 @@ def test_a_spreadsheet_with_decimal_commas_parts_cells_by_semicolons(tmp_path: P
         read_curve(path)
 
 
+@pytest.mark.parametrize("said", ["space: ijk", "space: voxel", "coordinate system = patient", "coordinates: LAS"])
+def test_a_space_that_is_none_is_not_taken_for_lps(tmp_path: Path, said: str) -> None:
+    path = tmp_path / "wire.csv"
+    path.write_text(f"# {said}\nx_mm,y_mm,z_mm\n0,0,0\n0,0,5\n", encoding="utf-8")
+    with pytest.raises(LoadError, match=f"space {said.split()[-1]}; expected LPS or RAS"):
+        read_curve(path)
+
+
+@pytest.mark.parametrize("said", ["coordinates: x, y, z", "orientation: LPS", "a spaceship: fast", "space: LPS"])
+def test_what_says_nothing_of_the_space_is_no_space(tmp_path: Path, said: str) -> None:
+    path = tmp_path / "wire.csv"
+    path.write_text(f"# {said}\nx_mm,y_mm,z_mm\n0,0,0\n0,0,5\n", encoding="utf-8")
+    assert len(read_curve(path).points_mm) == 2
+
+
 def test_a_unit_in_a_cell_of_its_own_is_a_unit(tmp_path: Path) -> None:
     """Metres passed for mm."""
     path = tmp_path / "wire.csv"

@@ -39,6 +39,10 @@ NOT_OURS = (
     "no budget: it is drawn by this project's own solver, and says what inputs do to its wires alone; of wires from "
     "elsewhere it would take their errors for uncertainty"
 )
+FEW_ALONE = (
+    f"budget.members_alone = {{}}: of fewer than {FEWEST} insertions nothing is said, so that the table by source has "
+    f"no values; give {FEWEST} or more, or 0 for no such table"
+)
 DISTAL = 20
 """Number of points at a wire's end that count as distal: at the usual step of 0.5 mm its last 10 mm."""
 
@@ -65,6 +69,7 @@ def budgeted(run: Context, known: Known) -> Known:
             return known
     run.log.assumptions.append(work.said())
     run.log.warnings += _lost(found, settings.members) + _rare(rank, settings.members)
+    run.log.warnings += [FEW_ALONE.format(settings.members_alone)] * (0 < settings.members_alone < FEWEST)
     done = tuple(replace(frame, budget=found.get(frame.index)) for frame in known.frames)
     return replace(known, frames=done, sources=tuple(rows), ends_rank=rank)
 
