@@ -13,6 +13,7 @@ from pipeline.status import FrameStatus
 from pipeline.trace.attempt import EntryPose
 from pipeline.trace.coarse import coarse_lumen, coarse_scan, times
 from pipeline.trace.config import TraceConfig
+from pipeline.trace.doubts import FAINT_BEYOND
 from pipeline.trace.elsewhere import brightest_line
 from pipeline.trace.explain import explained, hardly_begun, missed_mm
 from pipeline.trace.onward import GOES_ON
@@ -24,6 +25,7 @@ from pipeline.trace.whose_end import BEYOND_GAP, DIM_FROM_TIP, GAP, cleared
 __all__ = [
     "BEYOND_GAP",
     "DIM_FROM_TIP",
+    "FAINT_BEYOND",
     "GAP",
     "GOES_ON",
     "cleared",

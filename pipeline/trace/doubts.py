@@ -7,7 +7,7 @@ import numpy as np
 from pipeline.arrays.grids import spread
 from pipeline.arrays.jets import gaussian_taps, smooth_voxels
 from pipeline.arrays.polyline import tip_tangent
-from pipeline.model import Curve
+from pipeline.model import Array, Curve
 from pipeline.status import FrameStatus
 from pipeline.trace.ahead import WASHED, washed_out
 from pipeline.trace.attempt import ENTRY_REACH_MM, Attempt, dense
@@ -15,9 +15,15 @@ from pipeline.trace.onward import FAINTEST, GOES_ON, TANGENT_MM
 from pipeline.trace.subtraction import CREST_VOXELS, Subtraction
 from pipeline.trace.tube import Tube
 from pipeline.trace.verdict import LEAST_SEEN, note_of
-from pipeline.trace.ways import goes_on_unseen
+from pipeline.trace.ways import MAYBE, QUICK, SURE, highest, ways_on
 from pipeline.trace.whose_end import along_line, nothing_beyond, of_full_height, of_one_device, of_one_line, with_marks
 
+FAINT_BEYOND = "faint_beyond"
+"""Level of a curve beyond whose tip something as faint as a streak goes on: its share of the wire's brightness."""
+STREAK, STREAK_SURE, HASTE = 0.015, 10.0, 2.0
+"""Least share of the wire's brightness, and least standard deviations, of such. Beyond 150 right ends of all cases of
+``tests.studies.seeing`` what had that share had 6.0 at most; an end of 3 % of the brightness of a wire 130 times as
+bright as the noise has 15. In haste it has less by up to the last."""
 OWN_NOISE = 0.25
 """Share of what counts as noise that changes from voxel to voxel, below which the rest is no noise: white noise has 1,
 noise correlated over 1.5 voxels 0.32. Frames of another phantom or contrast than their reference had 0.19."""
@@ -75,18 +81,33 @@ def faint_for_its_noise(curve: Curve) -> Curve:
 
 
 def ends_in_nothing(image: Subtraction, tube: Tube, curve: Curve) -> Curve:
-    """The curve, or the same as ambiguous where something beyond its tip is too bright, over its length, for noise."""
-    if curve.status is not FrameStatus.OK or image.correlated:
+    """The curve, or the same as ambiguous where something beyond its tip is too bright, over its length, for noise.
+
+    With FAINT_BEYOND among its levels where that is sure, but no brighter than streaks of the wire are.
+    """
+    if curve.status is not FrameStatus.OK:
         return curve
-    line = dense(tube, 0.5 * image.voxel)
     left = tube.sigma**2 / (tube.sigma**2 + (CREST_VOXELS * image.voxel) ** 2)
-    least = FAINTEST * tube.peak * min(1.0, left / BLURRED)
+    least, faint = FAINTEST * tube.peak * min(1.0, left / BLURRED), STREAK * tube.peak * left
+    ways = _beyond(image, tube, least, faint)
+    if not image.correlated and highest(ways, least) > SURE:
+        got, allowed = f"a faint line {GOES_ON}", "a tip with nothing beyond it"
+        do = "look whether the wire's end is fainter than the rest; scan with more dose"
+        return replace(curve, status=FrameStatus.TRACE_AMBIGUOUS, note=note_of(got, allowed, do))
+    if highest(ways, faint) > STREAK_SURE:
+        share = float(ways[np.argmax(ways[:, 1]), 0]) / (tube.peak * left)
+        return replace(curve, levels={**curve.levels, FAINT_BEYOND: share})
+    return curve
+
+
+def _beyond(image: Subtraction, tube: Tube, least: float, faint: float) -> Array:
+    """The brightest ways on (n, 2) from a wire's tip: looked for in haste where haste finds nothing of these greys."""
+    line = dense(tube, 0.5 * image.voxel)
+    here = line[-1], tip_tangent(line, TANGENT_MM)
     with image.showing(tube.voxels, tube.rest):
-        if not goes_on_unseen(image, line[-1], tip_tangent(line, TANGENT_MM), least):
-            return curve
-    got, allowed = f"a faint line {GOES_ON}", "a tip with nothing beyond it"
-    do = "look whether the wire's end is fainter than the rest; scan with more dose"
-    return replace(curve, status=FrameStatus.TRACE_AMBIGUOUS, note=note_of(got, allowed, do))
+        ways = ways_on(image, *here, QUICK)
+        seen = highest(ways, least) > MAYBE or highest(ways, faint) > STREAK_SURE - HASTE
+        return ways_on(image, *here) if seen else ways
 
 
 def not_washed_out(image: Subtraction, tube: Tube, curve: Curve) -> Curve:

@@ -89,28 +89,29 @@ def _noise(image: Subtraction) -> float:
     return max(spread(image.along(points.reshape(-1, 3)).reshape(SAMPLES, -1).mean(axis=0)), 1e-6)
 
 
-def brightest(
-    image: Subtraction, tip: Array, heading: Array, least: float, kept: int = KEPT, along: Grey | None = None
-) -> float:
-    """How many standard deviations the brightest way on from a tip stands out, as if it had PIECES of them; 0 where its
-    mean is below ``least``.
+def ways_on(image: Subtraction, tip: Array, heading: Array, kept: int = KEPT, along: Grey | None = None) -> Array:
+    """Of the brightest ways on from a tip, of 1 to PIECES pieces (PIECES, 2): mean grey, and how many standard
+    deviations that stands out, as if it had PIECES of them.
 
-    least : grey that a wire has.  kept : how many ways are continued.  along : other grey of points than the image's,
-    with its noise.
+    kept : how many ways are continued.  along : other grey of points than the image's, with its noise.
     """
-    noise, height = _noise(image), 0.0
+    noise, found = _noise(image), []
     ways, sums, headings = tip[None, None], np.zeros(1), heading[None]
     for n in range(1, PIECES + 1):
         ways, sums, headings = _longer(image, along or image.along, ways, sums, headings, kept)
-        if sums[0] > n * least:
-            height = max(height, float(sums[0]) / (noise * np.sqrt(n)) + FEWER * (PIECES - n))
-    return height
+        found.append((float(sums[0]) / n, float(sums[0]) / (noise * np.sqrt(n)) + FEWER * (PIECES - n)))
+    return np.array(found)
+
+
+def highest(ways: Array, least: float) -> float:
+    """The most standard deviations of the ways (n, 2) whose mean grey is above ``least``, what a wire has; else 0."""
+    return float(np.max(ways[ways[:, 0] > least, 1], initial=0.0))
 
 
 def goes_on_unseen(
     image: Subtraction, tip: Array, heading: Array, least: float, sure: float = SURE, along: Grey | None = None
 ) -> bool:
-    """Whether a way on from a tip stands out by ``sure`` standard deviations; see ``brightest`` for the others."""
-    if brightest(image, tip, heading, least, QUICK, along) < MAYBE:
+    """Whether a way on from a tip stands out by ``sure`` standard deviations; see ``ways_on`` for the others."""
+    if highest(ways_on(image, tip, heading, QUICK, along), least) < MAYBE:
         return False
-    return brightest(image, tip, heading, least, along=along) > sure
+    return highest(ways_on(image, tip, heading, along=along), least) > sure

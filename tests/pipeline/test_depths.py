@@ -20,14 +20,14 @@ from pipeline.run.stages.depths import (
     traced_depths,
     turned_round,
 )
-from pipeline.run.stages.dim_ends import faint_ends, own_dim_ends
+from pipeline.run.stages.dim_ends import barely_seen, faint_ends, own_dim_ends
 from pipeline.run.stages.known import Frame
 from pipeline.run.stages.repeated import once
 from pipeline.run.stages.simulate import with_depth
 from pipeline.run.stages.trace import _last_curve, _Part
 from pipeline.simulate.clamp import Clamp
 from pipeline.status import FrameStatus
-from pipeline.trace import DIM_FROM_TIP, GOES_ON, of_catheter, of_length
+from pipeline.trace import DIM_FROM_TIP, FAINT_BEYOND, GOES_ON, of_catheter, of_length
 from pipeline.trace.config import TraceConfig
 
 
@@ -200,6 +200,16 @@ def test_a_faint_end_that_some_frames_show_is_doubted_in_the_others() -> None:
     assert not faint_ends(refused(unstated, 1)), "one frame of five"
     assert not faint_ends(refused(found, 3)), "depths are stated, and tell"
     assert not faint_ends(unstated)
+
+
+def test_an_end_as_faint_as_a_streak_is_told_of_where_nobody_states_a_depth() -> None:
+    lengths = [10.0, 15.0, 20.0]
+    found = frames(lengths, lengths)
+    with_more = [replace(f, curve=replace(f.curve, levels={FAINT_BEYOND: 0.03})) for f in found[1:] if f.curve]
+    (said,) = barely_seen([found[0], *(replace(f, expected_mm=np.nan) for f in with_more)])
+    assert said.startswith("beyond the traced tip of frames 1, 2 something goes on, 0.03 times as bright as the wire")
+    assert not barely_seen(found)
+    assert not barely_seen(with_more), "depths are stated, and tell"
 
 
 def test_a_copy_of_a_frame_is_no_third_that_agrees() -> None:

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pipeline.run.stages.known import Frame
-from pipeline.trace import DIM_FROM_TIP, GOES_ON, cleared
+from pipeline.run.stages.known import Frame, trusted
+from pipeline.trace import DIM_FROM_TIP, FAINT_BEYOND, GOES_ON, cleared
 from reports.case_files import listed
 
 FEWEST = 3
@@ -54,4 +54,18 @@ def faint_ends(frames: Sequence[Frame]) -> list[str]:
         f"in frames {listed(go_on)} a line goes on {GOES_ON}: the wire's end may be too faint in {listed(others)}, "
         "too, whose traces then end short of it, with a sigma that does not say so; state insertion_mm (mm) of each "
         "frame, or the wire's opacity"
+    ]
+
+
+def barely_seen(frames: Sequence[Frame]) -> list[str]:
+    """A warning where something as faint as a streak goes on beyond traced tips whose depths nobody stated."""
+    unstated = [frame for frame in frames if np.isnan(frame.expected_mm)]
+    shares = {n: c.levels[FAINT_BEYOND] for n, c in trusted(unstated).items() if FAINT_BEYOND in c.levels}
+    if not shares:
+        return []
+    several = f"frame{'s' * (len(shares) > 1)} {listed([*map(str, shares)])}"
+    return [
+        f"beyond the traced tip of {several} something goes on, {max(shares.values()):.2g} times as bright as the wire "
+        "at most: a streak of it, or an end that is so faint, without which the trace is short; look there, and state "
+        "insertion_mm (mm) of each frame, or the wire's opacity"
     ]

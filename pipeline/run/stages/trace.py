@@ -28,7 +28,7 @@ from pipeline.run.stages.depths import (
     traced_depths,
     turned_round,
 )
-from pipeline.run.stages.dim_ends import faint_ends, own_dim_ends
+from pipeline.run.stages.dim_ends import barely_seen, faint_ends, own_dim_ends
 from pipeline.run.stages.gaps import own_gaps
 from pipeline.run.stages.known import Context, Frame, Known, trusted
 from pipeline.run.stages.own_curves import RESAMPLE, as_given, given_curves, rough
@@ -67,6 +67,7 @@ def trace_frames(run: Context, known: Known) -> Known:
     run.log.warnings += doubtful_gaps
     frames = _in_step(run, turned_round(frames), voxel_mm)
     run.log.warnings += [*faint_ends(frames), *alike(frames), *rescanned(frames, run.case.calibrated_traces)]
+    run.log.warnings += barely_seen(frames) if run.case.wire.opacity is None else []
     run.log.warnings += too_thin(frames, known.vessel, run.case.wire.radius_mm)
     if not given:
         run.log.warnings += cut_off(trusted(frames))
