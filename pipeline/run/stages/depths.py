@@ -9,6 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.special import stdtrit
 
 from pipeline.arrays.grids import spread
 from pipeline.model import Array, Clamp
@@ -27,6 +28,8 @@ SURE = 5.0
 """First limit on how far a difference may be off the usual one: so many standard deviations of all frames."""
 SURE_TIP = 4.0
 """Second limit: so many standard deviations of the frame's own tip."""
+LEAST_SCALE, CHANCE = 0.01, 1e-3
+"""By how much a scale must be off to be told, and how often a right one may seem as far off to that side."""
 LEAST_VOXELS = 3.0
 """Third limit, voxels: a length is out of step beyond all three. Also the least shrinking that gets a warning."""
 
@@ -102,6 +105,26 @@ def stated_elsewhere(frames: Sequence[Frame], depths_mm: Mapping[int, float], to
         f"the traced wires are {abs(usual):.1f} mm {'longer' if usual > 0 else 'shorter'} than insertion_mm states"
         f"{begins} (median of {len(known)} frames): check from where depths were counted, and entry_mm; the simulated "
         "wires go as deep as the traced ones, unless simulate.depth is manifest"
+    ]
+
+
+def on_another_scale(frames: Sequence[Frame], depths_mm: Mapping[int, float]) -> list[str]:
+    """A warning where traced depths grow faster, or slower, than insertion_mm. depths_mm : of ``traced_depths``.
+
+    By least squares over the frames; a scale that is read by hand to 0.5 mm leaves a few per cent open.
+    """
+    known = [f for f in frames if f.index in depths_mm]
+    stated, traced = np.array([(f.expected_mm, depths_mm[f.index]) for f in known]).reshape(-1, 2).T
+    if len(known) < FEWEST or np.ptp(stated) == 0.0:
+        return []
+    (slope, _), covariance = np.polyfit(stated, traced - stated, 1, cov=True)
+    deviation = float(np.sqrt(covariance[0, 0]))
+    if abs(slope) < max(LEAST_SCALE, float(stdtrit(len(known) - 2, 1.0 - CHANCE)) * deviation):
+        return []
+    return [
+        f"the traced wires grow {1.0 + slope:.3f} times as fast as insertion_mm states (standard deviation "
+        f"{deviation:.2g}, {len(known)} frames): is the scans' voxel size right, or the scale that depths were read "
+        "from? With a wrong size all lengths and errors are as wrong"
     ]
 
 

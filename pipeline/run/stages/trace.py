@@ -20,6 +20,7 @@ from pipeline.run.stages.beside import beside_what_is_seen
 from pipeline.run.stages.depths import (
     in_another_order,
     in_step,
+    on_another_scale,
     perhaps_turned,
     shrinking,
     standing,
@@ -88,6 +89,7 @@ def _in_step(run: Context, frames: list[Frame], voxel_mm: float) -> list[Frame]:
     run.log.warnings += swapped
     frames = frames if swapped else perhaps_turned(frames)
     run.log.warnings += stated_elsewhere(frames, depths_mm, tolerance_mm)
+    run.log.warnings += [] if swapped else on_another_scale(frames, depths_mm)
     frames = in_step(to_depth(frames, depths_mm, tolerance_mm), voxel_mm)
     run.log.warnings += [*shrinking(frames, voxel_mm), *standing(frames, voxel_mm)]
     if run.case.traces:
