@@ -9,13 +9,13 @@ import pytest
 from scipy import ndimage
 from scipy.stats import ncx2
 
-from pipeline.arrays.jets import Blurred, jet, jets_at, ridge_frame, ridge_step, values_at
+from pipeline.arrays.jets import Blurred, jets_at, values_at
 from pipeline.arrays.spare import Spare
-from pipeline.segment._kernels.wall import hessian, value_gradient
 from pipeline.segment.blurred import blur_of_wall, half_level_offset
 from pipeline.trace._kernels.tube import Blob, Claim, active_voxels, normal_equations
 from pipeline.trace.tube import Tube, fit_tube, predicted, sampled, sampling, tint_nodes
 from solver.grid import read_only
+from tests.pipeline.entry_points import hessian, jet, ridge_frame, ridge_step, value_gradient
 
 
 def test_spline_derivatives_are_those_of_its_value():
