@@ -105,9 +105,10 @@ class Anatomy:
 
     def distance_and_gradient(self, points_mm: ArrayLike) -> tuple[Array, Array]:
         """Signed distance (n,) and its gradient (n, 3)."""
-        points = np.ascontiguousarray(np.atleast_2d(np.asarray(points_mm, dtype=np.float64)))
+        # for points that cannot be written to the kernel would be compiled once more
+        points = np.require(np.atleast_2d(points_mm), np.float64, ["C", "W"])
         values, gradients = np.empty(len(points)), np.empty((len(points), 3))
-        kernels.distances(np.require(points, requirements=["C", "W"]), self.tables, values, gradients)
+        kernels.distances(points, self.tables, values, gradients)
         return values, gradients
 
     def tube(self, name: str) -> Tube:

@@ -21,7 +21,7 @@ from pipeline.trace.whose_end import along_line, nothing_beyond, of_full_height,
 FAINT_BEYOND = "faint_beyond"
 """Level of a curve beyond whose tip something as faint as a streak goes on: its share of the wire's brightness."""
 STREAK, STREAK_SURE, HASTE = 0.015, 10.0, 2.0
-"""Least share of the wire's brightness, and least standard deviations, of such. Beyond 150 right ends of all cases of
+"""Least share of the wire's brightness, and least standard deviations, of such. Beyond 118 right ends of the cases of
 ``tests.studies.seeing`` what had that share had 6.0 at most; an end of 3 % of the brightness of a wire 130 times as
 bright as the noise has 15. In haste it has less by up to the last."""
 OWN_NOISE = 0.25

@@ -28,10 +28,10 @@ SURE = 5.0
 """First limit on how far a difference may be off the usual one: so many standard deviations of all frames."""
 SURE_TIP = 4.0
 """Second limit: so many standard deviations of the frame's own tip."""
-LEAST_SCALE, CHANCE = 0.01, 1e-3
-"""By how much a scale must be off to be told, and how often a right one may seem as far off to that side."""
 LEAST_VOXELS = 3.0
 """Third limit, voxels: a length is out of step beyond all three. Also the least shrinking that gets a warning."""
+LEAST_SCALE, CHANCE = 0.01, 1e-3
+"""By how much a scale must be off to be told, and how often a right one may seem as far off to that side."""
 
 
 def in_step(frames: Sequence[Frame], voxel_mm: float) -> list[Frame]:
