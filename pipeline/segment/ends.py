@@ -40,8 +40,6 @@ BLUNT = 0.75
 """Radius at the end over that before it: a cone that closes within 4 radii has 0.4, a dome 1."""
 ALIKE = 0.6, 1.5
 """Radius of what lies ahead over the vessel's."""
-IN_LINE = 0.8
-"""Cosine between the way across and each vessel's own axis: a band may be oblique, and a vessel bends."""
 AS_BRIGHT = 0.6
 """Contrast of what lies ahead, least, of the vessel's."""
 MOST_TRIED = 8
@@ -149,12 +147,6 @@ def _part(labels: NDArray[Any], at: Array) -> NDArray[np.bool_]:
     return np.asarray(labels == most)
 
 
-def _in_line(points: Array, end: Array, heading: Array) -> bool:
-    """Whether a vessel's voxels (n, 3) lie along a heading (3,)."""
-    axis = np.linalg.eigh(np.cov(points.T))[1][:, -1]
-    return bool(abs(axis @ heading) > IN_LINE and runs_along(points, end, heading))
-
-
 def _goes_on(scene: _Scene, rays: _Rays) -> float:
     """The radius, mm, of the vessel at an end, if what its rays meet lies in line, is as wide and as bright; or 0."""
     spacing, gap = np.asarray(scene.scan.spacing_mm), float(rays.gap.min())
@@ -187,7 +179,7 @@ def _goes_on(scene: _Scene, rays: _Rays) -> float:
     here, there = ball[own].astype(float), ball[ahead].astype(float)
     way = there.mean(axis=0) - here.mean(axis=0)
     way /= np.linalg.norm(way)
-    return radius * step if all(_in_line(part, np.zeros(3), way) for part in (here, there)) else 0.0
+    return radius * step if all(runs_along(part, np.zeros(3), way) for part in (here, there)) else 0.0
 
 
 def ends(
