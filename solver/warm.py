@@ -13,6 +13,7 @@ import numpy as np
 
 from solver._kernels import closed_form, newton_method
 from solver._kernels.forces import contact_forces, push_force
+from solver._kernels.forks import turned_aside
 from solver._kernels.insertion import accept_or_revert, begin_step, collect, next_target
 from solver._kernels.minimise import look_again
 from solver._kernels.septum import through_wall
@@ -55,7 +56,7 @@ def warm_up(*, beside: bool = False) -> None:
             return
         with subprocess.Popen([sys.executable, "-c", "from solver import warm; warm.compile_lanes()"]):
             # each begins with half of what both need: what is not on disk when it is asked for is compiled twice
-            _compile(through_wall, push_force, accept_or_revert, contact_forces, collect)
+            _compile(turned_aside, through_wall, push_force, accept_or_revert, contact_forces, collect)
             _compile(newton_method.iterate, closed_form.iterate)
             relax(WIRE, _wall(), depth_mm=1.0)
 

@@ -11,7 +11,7 @@ from solver import _tolerances as tol
 from solver._kernels.algebra import dot, load3, minus, scaled, store3
 from solver._kernels.data import CONVERGED, CURRENT, SPARE, TRIAL, Problem
 from solver._kernels.energy import bending_energy, energy_of, total_energy
-from solver._kernels.flags import inlined, kernel, merged
+from solver._kernels.flags import cached, inlined, kernel, merged
 from solver._kernels.forces import copy_state
 from solver._kernels.friction import take_loads
 from solver._kernels.minimise import relax_with_friction
@@ -36,7 +36,7 @@ def other_side(handle: Any, k: int) -> float:
     return back_again(handle, k, outcome, energy, other)
 
 
-@kernel
+@cached
 def turned_aside(handle: Any, k: int) -> bool:
     """Mirror what the step changed, and keep what it led to; False where that is not worth a relaxation."""
     report = handle.report[0]
