@@ -1,11 +1,15 @@
-"""Ways from Python into kernels that have none of their own; kept on disk until a source behind them changes."""
+"""Ways from Python into kernels that have none of their own; kept on disk until a source behind them changes.
+
+Where they can they take a wire's handle, and call what insertions have compiled for it: with the arrays themselves the
+kernels would be compiled again, for other types, and unpacking these takes as long as that.
+"""
 
 from __future__ import annotations
 
 from typing import Any
 
 from solver._compile import on_disk
-from solver._kernels import blocks, closed_form, energy, forces, forks, newton, rollout, rotation, septum, start
+from solver._kernels import blocks, closed_form, forces, forks, minimise, newton, rollout, rotation, septum
 from solver._kernels import free_body as beyond
 from solver._kernels.flags import FAST
 from solver._kernels.lanes import field as lane_field
@@ -15,18 +19,23 @@ entry_point = on_disk(**FAST)
 
 
 @entry_point
-def total_energy(problem: Any, slot: int, k: int) -> float:
-    return energy.total_energy(problem, slot, 0, k)
+def look_again(handle: Any, slot: int, k: int) -> None:
+    minimise.look_again(handle.problem, slot, k)
 
 
 @entry_point
-def place(chain: Any, state: Any, slot: int, k: int) -> None:
-    rollout.place(chain, state, slot, k)
+def place(handle: Any, slot: int, k: int) -> None:
+    rollout.place(handle.problem.chain, handle.problem.state, slot, k)
 
 
 @entry_point
-def sweep(problem: Any, slot: int, k: int, damping: float, report: Any) -> bool:
-    return newton.sweep(problem, slot, 0, k, damping, report)
+def iterate(handle: Any, k: int, now: Any, report: Any) -> int:
+    return closed_form.iterate(handle.problem, k, now, 0.0, report)
+
+
+@entry_point
+def sweep(handle: Any, slot: int, k: int, damping: float, report: Any) -> bool:
+    return newton.sweep(handle.problem, slot, 0, k, damping, report)
 
 
 @entry_point
@@ -35,23 +44,8 @@ def through_wall(field: Any, x: Any, k: int, margin: float) -> bool:
 
 
 @entry_point
-def costate(problem: Any, slot: int, k: int, report: Any) -> None:
-    newton.costate(problem, slot, k, report)
-
-
-@entry_point
-def gradients(problem: Any, slot: int, k: int) -> None:
-    closed_form.gradients(problem, slot, k)
-
-
-@entry_point
-def aim(chain: Any, u: Any, x: Any, r: Any, j: int) -> None:
-    start.aim(chain, u, x, r, j)
-
-
-@entry_point
-def softest_way(problem: Any, k: int, report: Any) -> bool:
-    return forks.softest_way(problem, k, report)
+def softest_way(handle: Any, k: int, report: Any) -> bool:
+    return forks.softest_way(handle.problem, k, report)
 
 
 @entry_point
@@ -94,10 +88,10 @@ def outside_by(field: Any, x: Any, k: int) -> float:
 
 
 @entry_point
-def free_body(problem: Any, slot: int, cut: int, k: int) -> Any:
-    return beyond.free_body(problem, slot, cut, k, 0)
+def free_body(handle: Any, slot: int, cut: int, k: int) -> Any:
+    return beyond.free_body(handle.problem, slot, cut, k, 0)
 
 
 @entry_point
-def work_on(problem: Any, cut: int, k: int, back: int) -> Any:
-    return beyond.work_on(problem, cut, k, back)
+def work_on(handle: Any, cut: int, k: int, back: int) -> Any:
+    return beyond.work_on(handle.problem, cut, k, back)

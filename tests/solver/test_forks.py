@@ -104,13 +104,13 @@ def test_the_softest_mode_is_the_same_wherever_its_search_begins() -> None:
     list(insertion.to_depths([20.0, 30.0]))
     work = insertion._work
     problem, report, now = work.problem, work.report[0], work.problem.scratch.descent[0]
-    firm = [sweep(problem, 0, work.k, -term_at(rung), report) for rung in range(tol.RUNGS)]
+    firm = [sweep(work.handle, 0, work.k, -term_at(rung), report) for rung in range(tol.RUNGS)]
     gives = firm.index(False)
     assert not any(firm[gives:])
     found = []
     for begun in (0, gives - 1, gives, gives + 1, gives + 20, tol.RUNGS):
         now.rung = begun
-        assert softest_way(problem, work.k, report)
+        assert softest_way(work.handle, work.k, report)
         assert now.rung == gives
         found.append((int(report.joint), *report.bend, problem.scratch.gain[: work.k].copy()))
     for joint, *bend, gain in found:

@@ -25,7 +25,7 @@ def test_the_whole_wire_has_the_gradient_of_the_sweep() -> None:
     insertion = in_bend()
     *_, found = insertion.to_depths([20.0, 45.0], 20.0, [5.0, 25.0])
     work = insertion._work
-    energy, force, moment = free_body(work.problem, 0, 0, 45)
+    energy, force, moment = free_body(work.handle, 0, 0, 45)
     at_entry = work.problem.pressed * work.problem.chain.held[0]
     assert energy == pytest.approx(sum(work.problem.state.energies[0].tolist()) - at_entry, rel=1e-12)
     np.testing.assert_allclose(force, work.report[0].force, rtol=1e-9)
@@ -37,7 +37,7 @@ def test_a_joint_at_rest_holds_the_moment_of_all_beyond_it(cut: int) -> None:
     insertion = in_bend()
     *_, found = insertion.to_depths([20.0, 45.0], 20.0, [5.0, 25.0])
     problem = insertion._work.problem
-    _, _, moment = free_body(problem, 0, cut, 45)
+    _, _, moment = free_body(insertion._work.handle, 0, cut, 45)
     held = problem.chain.bend[cut] * problem.state.u[0, cut, :2]
     np.testing.assert_allclose(-(found.frames[cut].T @ moment)[:2], held, rtol=0.0, atol=1e-6 * np.abs(held).max())
 
@@ -50,7 +50,7 @@ def test_work_on_what_is_beyond_a_node_becomes_its_energy(cut: int) -> None:
         insertion, way = in_bend(), np.array([*np.arange(1.0, 45.5), 45.5 - half, 45.5 + half])
         *_, before, after = insertion.to_depths(way, 20.0, np.maximum(way - 30.0, 0.0).tolist())
         assert [len(s.joints_mm) for s in (before, after)] == [46, 47]
-        off, work, change, energy = work_on(insertion._work.problem, cut, 46, 1)
+        off, work, change, energy = work_on(insertion._work.handle, cut, 46, 1)
         assert 0.0 < change < work < energy
         missing.append(abs(off) / work)
     assert missing[0] < 2e-3
