@@ -179,8 +179,8 @@ def test_order_in_the_voxel_size_of_the_wall() -> None:
     voxels = (0.8, 0.4, 0.2, 0.1)
     wire, shapes = GuideWire(0.5, 0.18, STIFFNESS), []
     for voxel in voxels:
-        low = np.full(3, -5.0) - 0.37 * voxel
-        wall = VesselWall(sampled(bend_distance, voxel, low, (25.0, 5.0, 64.0), "float32"), 1.0)
+        low = np.full(3, -4.2) - 0.37 * voxel  # two voxels and more around the lumen that the wire lies in
+        wall = VesselWall(sampled(bend_distance, voxel, low, (20.0, 4.2, 61.0), "float32"), 1.0)
         shapes.append(last(Insertion(wire, wall, [0, 0, 0], [0, 0, 1]), np.arange(1.0, 61.0)).joints_mm)
     errors = [np.sqrt(np.mean(np.sum((x - shapes[-1]) ** 2, axis=1))) for x in shapes[:-1]]
     order = np.polyfit(np.log(voxels[:-1]), np.log(errors), 1)[0]
