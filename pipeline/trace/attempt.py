@@ -10,7 +10,7 @@ from pipeline.trace.crests import BEND, Tracklet, find_crests
 from pipeline.trace.knots import CLOSEST, FIRST_BLUR, first_tube
 from pipeline.trace.link import Path, link, resampled, with_doubles
 from pipeline.trace.onward import beyond
-from pipeline.trace.profile import ended
+from pipeline.trace.profile import LEAST_LEVEL, ended
 from pipeline.trace.stated import Opacity, ended_as_stated
 from pipeline.trace.steps import EVEN
 from pipeline.trace.subtraction import Subtraction, numbered
@@ -120,7 +120,9 @@ def _off(image: Subtraction, tube: Tube, pieces: list[Tracklet], known: Array) -
     """
     near = NEAR_VOXELS * image.voxel
     tree = cKDTree(np.concatenate([known, dense(tube, image.voxel)]))
-    least = STREAK_SHARE * tube.peak * min(1.0, 2.0 * float(tube.steps.levels.min()) + 0.1)
+    levels = tube.steps.levels
+    dimmest = float(levels[levels > LEAST_LEVEL].min(initial=1.0))  # what is dimmer yet is no wire, but a gap
+    least = STREAK_SHARE * tube.peak * min(1.0, 2.0 * dimmest + 0.1)
     found = []
     for piece in pieces:
         if piece.grey >= least:

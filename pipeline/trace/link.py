@@ -5,6 +5,7 @@ side by side or have gaps: a tracklet ends where the image is ambiguous, and its
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,9 @@ END_SPAN = 6
 """Crest points over which an end's tangent is averaged."""
 BRIDGE_STEP_MM = 0.2
 """Distance of points put in over a gap."""
+SPECK_SHARE, SPECK_MM = 0.5, 2.0
+"""Crest grey, as a share of the wire's, and length at the entry below which a bright line is no wire: beside a wire of
+steel a cone-beam scan has streaks 1 mm long of a quarter of its grey, one of which may lie nearer the entry."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,20 +101,39 @@ def hermite(p: Array, tp: Array, q: Array, tq: Array, step: float) -> Array:
     )
 
 
-def _end_at_entry(pieces: list[Tracklet], entry: Array, direction: Array, reach: float) -> int | None:
-    """The end, numbered as in :func:`_ends`, to which the tracklet nearest the entry leads in the wire's direction.
+def _ends_at_entry(pieces: list[Tracklet], entry: Array, direction: Array, reach: float) -> list[int]:
+    """The ends, numbered as in :func:`_ends`, to which tracklets lead in the wire's direction, nearest the entry first.
 
-    None where no tracklet passes within ``reach`` mm; one that runs across the entry direction is another strand.
+    Those that pass within ``reach`` mm; one that runs across the entry direction is another strand.
     """
-    best: tuple[float, int] | None = None
+    found = []
     for m, piece in enumerate(pieces):
         offset = piece.points - entry
         far = np.linalg.norm(offset, axis=1) + np.maximum(0.0, -(offset @ direction))
         n = int(np.argmin(far))
         run = float(piece.tangents[n] @ direction)
-        if far[n] < reach and abs(run) > 0.5 and (best is None or far[n] < best[0]):
-            best = float(far[n]), 2 * m + (run > 0)
-    return None if best is None else best[1]
+        if far[n] < reach and abs(run) > 0.5:
+            found.append((float(far[n]), m, 2 * m + (run > 0)))
+    return [end for _, _, end in sorted(found)]
+
+
+def _chain(end: int, taken: dict[int, int]) -> list[int]:
+    """Ends to which the tracklets lead that follow each other from the one that leads to ``end``, which is the first.
+
+    taken : of ``join``.
+    """
+    ends = [end]
+    while ends[-1] in taken:
+        ends.append(taken[ends[-1]] ^ 1)
+    return ends
+
+
+def _is_speck(chain: list[int], at_entry: list[int], pieces: list[Tracklet]) -> bool:
+    """Whether a chain is short and faint beside another tracklet at the entry, to which it does not lead."""
+    own = [pieces[end // 2] for end in chain]
+    short = sum(piece.length for piece in own) < SPECK_MM
+    most = max(piece.grey for piece in own)
+    return short and any(most < SPECK_SHARE * pieces[end // 2].grey for end in at_entry)
 
 
 def with_doubles(pieces: list[Tracklet]) -> list[Tracklet]:
@@ -127,25 +150,18 @@ def link(pieces: list[Tracklet], entry: Array, direction: Array, longest: float,
 
     longest : widest gap bridged, mm.  What lies before the entry along the same tracklet is kept: the fit needs it.
     """
-    end = _end_at_entry(pieces, entry, direction, reach)
-    if end is None:
+    at_entry, taken = _ends_at_entry(pieces, entry, direction, reach), join(pieces, longest)
+    chains = [_chain(end, taken) for end in at_entry]
+    if not chains:
         return None
-    taken = join(pieces, longest)
-
-    def towards(end: int) -> Tracklet:
-        return pieces[end // 2] if end % 2 else pieces[end // 2].reversed()
-
-    piece = towards(end)
-    points, bridged, bridges = [piece.points], [np.zeros(len(piece.points), bool)], 0
-    while end in taken:
-        end = taken[end] ^ 1
-        after = towards(end)
+    chain = next(chain for chain in chains if not _is_speck(chain, at_entry, pieces))
+    follow = [pieces[end // 2] if end % 2 else pieces[end // 2].reversed() for end in chain]
+    points, bridged = [follow[0].points], [np.zeros(len(follow[0].points), bool)]
+    for piece, after in pairwise(follow):
         gap = hermite(piece.points[-1], piece.tangents[-1], after.points[0], after.tangents[0], BRIDGE_STEP_MM)
         points += [gap, after.points]
         bridged += [np.ones(len(gap), bool), np.zeros(len(after.points), bool)]
-        bridges += 1
-        piece = after
-    return Path(np.concatenate(points), np.concatenate(bridged), bridges)
+    return Path(np.concatenate(points), np.concatenate(bridged), len(follow) - 1)
 
 
 def extended(points: Array, ahead: float, step: float) -> Array:

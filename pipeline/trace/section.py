@@ -5,7 +5,7 @@ for two that are 2.7 voxels apart; in contact it is 0.06, twice as bright.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -105,6 +105,10 @@ class Section:
     window: Array
     noise: float
 
+    def without(self, harmonic: NDArray[np.complex128]) -> "Section":
+        """The section less a harmonic (n,) over the grey on the axis that has nothing to do with the wire's shape."""
+        return replace(self, harmonic=self.harmonic - harmonic * self.grey)
+
     @cached_property
     def oblong(self) -> Array:
         """How far out of round it is (n,): the size of the harmonic's mean over the grey's."""
@@ -171,6 +175,18 @@ def paired_in_part(image: Subtraction, section: Section, fitted: NDArray[np.comp
         return twisted
     beyond = np.sqrt(np.maximum(0.0, mean(rest) ** 2 - (SURE_STRETCH * of_noise) ** 2))
     return max(twisted, float(beyond.max()) / (STRETCHED * (1.0 + _unevenness(image))))
+
+
+def as_sharp(image: Subtraction, points: Array, sigma: float, blur: Array) -> NDArray[np.complex128]:
+    """The harmonic (n,) over the grey on the axis of a round wire, points (n, 3), seen by a scanner of uneven blur.
+
+    blur : of ``blur_by_axis``.  One whose square is larger by D across the wire makes exp(-x^2 / 2 s^2) larger by
+    x^2 D / 2 s^4.
+    """
+    u, v = carried(_directions(points))
+    seen, radius = sigma**2 + (CREST_VOXELS * image.voxel) ** 2, RING_BLURS * sigma
+    usual = np.exp(-0.5 * radius**2 / seen) * radius**2 / (4.0 * seen**2)
+    return np.asarray(usual * (u + 1j * v) ** 2 @ blur)
 
 
 def _of_the_scanner(harmonic: NDArray[np.complex128], grey: Array, points: Array) -> NDArray[np.complex128]:

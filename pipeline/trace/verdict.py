@@ -24,6 +24,7 @@ from pipeline.trace.link import extended, resampled
 from pipeline.trace.profile import LEAST_LEVEL
 from pipeline.trace.section import (
     Section,
+    as_sharp,
     paired,
     paired_in_part,
     places_around,
@@ -31,6 +32,7 @@ from pipeline.trace.section import (
     second_harmonic,
     section_along,
 )
+from pipeline.trace.sharpness import blur_by_axis
 from pipeline.trace.steps import Steps
 from pipeline.trace.strands import BESIDE_VOXELS, DOUBLE, doubled, of_one_strand
 from pipeline.trace.subtraction import CREST_VOXELS, Subtraction
@@ -170,7 +172,7 @@ def judge(image: Subtraction, attempt: Attempt, points: Array, bridged: NDArray[
     double, pair = beside_itself(points, step, BESIDE_VOXELS * image.voxel), 0.0
     if not image.thick_slices:
         section = section_along(image, points, read)
-        pair = _pair(image, section, fitted, points, length_mm)
+        pair = _pair(image, section, attempt.tube, second_harmonic(fitted[0]), points)
         alone = share / of_one_strand(share, (ends > MEAN_OVER_MM) & ~bridged & ~faint)
         double |= doubled(alone, section.oblong, np.maximum(DOUBLE, 1.0 + 4.0 * noise), section.noise)
     outside = _outside(image, points)
@@ -186,10 +188,23 @@ def judge(image: Subtraction, attempt: Attempt, points: Array, bridged: NDArray[
     return Verdict(*first, bridged | faint | double | outside, faint_mm, double_mm)
 
 
-def _pair(image: Subtraction, section: Section, fitted: tuple[Array, Array], points: Array, length_mm: float) -> float:
-    """How far out of round the line is, all along or in part, over what one wire's may be."""
-    in_part = paired_in_part(image, section, second_harmonic(fitted[0]), points)
-    return max(paired(image, section, length_mm), in_part)
+def _pair(image: Subtraction, section: Section, tube: Tube, fitted: NDArray[np.complex128], points: Array) -> float:
+    """How far out of round the line is, all along or in part, over what one wire's may be; fitted : the tube's own.
+
+    A line that is further out than that is looked at once more without what the scanner makes of any wire.
+    """
+    found = _out_of_round(image, section, fitted, points)
+    blur = blur_by_axis(image, points, tube.sigma) if found > 1.0 else None
+    if blur is None:
+        return found
+    left = section.without(as_sharp(image, points, tube.sigma, blur))
+    return _out_of_round(image, left, fitted, points)
+
+
+def _out_of_round(image: Subtraction, section: Section, fitted: NDArray[np.complex128], points: Array) -> float:
+    """The larger of that of the whole line, and of the worst part of it."""
+    length_mm = section.step_mm * (len(points) - 1)
+    return max(paired(image, section, length_mm), paired_in_part(image, section, fitted, points))
 
 
 def _of_the_line(

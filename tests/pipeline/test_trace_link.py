@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from pipeline.model import arc_length
+from pipeline.trace.attempt import _off
 from pipeline.trace.crests import Tracklet
 from pipeline.trace.link import extended, join, link, with_doubles
 
@@ -45,6 +48,19 @@ def test_a_path_goes_on_over_a_gap_whichever_way_its_pieces_run(turned):
     np.testing.assert_allclose(path.points[:, :2], 0.0, rtol=0.0, atol=1e-12)
 
 
+def test_a_path_begins_with_the_wire_not_with_a_speck_that_lies_nearer_the_entry():
+    """48 mm of wire in a cone-beam scan were followed for 2 mm: along a streak of 1 mm, a quarter as bright."""
+    entry = np.array([0.0, 0.0, 0.5])
+    wire, speck = piece(-1.0, 20.0), piece(0.0, 1.0, 25.0)
+    beside = Tracklet(wire.points + [0.8, 0.0, 0.0], wire.tangents, wire.values)
+    assert link([speck, beside], entry, UP, 3.0, 4.0).points[-1] == pytest.approx([0.8, 0.0, 20.0])
+    for shaft in (piece(0.0, 4.0, 25.0), piece(0.0, 1.0, 60.0)):
+        assert link([shaft, beside], entry, UP, 3.0, 4.0).points[-1, 0] == 0.0, "a short wire or a dim one is a wire"
+    coil = piece(1.5, 20.0)
+    assert link([speck, coil], entry, UP, 3.0, 4.0).points[0, 2] == 0.0, "a dim shaft that leads to a bright coil"
+    assert link([speck], entry, UP, 3.0, 4.0) is not None
+
+
 def beyond(gap, angle, tangent_angle):
     """A straight crest that begins ``gap`` mm from the origin, ``angle`` off z, and runs ``tangent_angle`` off it."""
     way, run = (np.array([np.sin(a), 0.0, np.cos(a)]) for a in (angle, tangent_angle))
@@ -70,3 +86,17 @@ def test_a_path_is_continued_straight_by_what_is_asked():
     longer = extended(points, 2.0, 0.25)
     assert arc_length(longer)[-1] == pytest.approx(arc_length(points)[-1] + 2.0, abs=0.25)
     np.testing.assert_allclose(longer[-1] / np.linalg.norm(longer[-1]), [0.6, 0.0, 0.8], rtol=0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize(("levels", "grey", "counts"), [
+    ([1.0], 25.0, True), ([1.0], 15.0, False), ([0.15, 1.0], 15.0, True), ([0.0, 1.0], 15.0, False),
+])  # fmt: skip
+def test_what_is_off_the_wire_counts_by_its_dimmest_part_that_is_wire(levels, grey, counts):
+    """A wire that is missing over half a millimetre at the entry had each of its own streaks against it."""
+    tube = SimpleNamespace(
+        peak=100.0, length_mm=20.0, intervals=1.0, at=lambda s: np.outer(20.0 * s, UP),
+        steps=SimpleNamespace(levels=np.array(levels)),
+    )  # fmt: skip
+    away = Tracklet(piece(0.0, 5.0).points + [3.0, 0.0, 0.0], np.tile(UP, (21, 1)), np.full(21, grey))
+    off = _off(SimpleNamespace(voxel=0.3), tube, [piece(0.0, 20.0), away], np.zeros((0, 3)))
+    assert [length for _, length in off] == [5.0] * counts
