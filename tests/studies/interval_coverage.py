@@ -21,7 +21,10 @@ from pipeline.compare.pooled import Scored, skill
 SEED = 100
 SPREAD, OUTLIERS, LARGER, NULL, SHARED = 0.8, 0.05, 16.0, 10.0, 0.6
 SIMULATOR = 0.4
+WRONG, WRONG_BY = 0.2, 100.0
+"""Share of insertions that lie in a wrong branch all along, and their mean square over the others'."""
 PARTNERS = (3, 4, 6, 20)
+FEW = (3, 6, 12)
 FRAMES, FEWER, MORE = 30, 10, 50
 """Frames of an insertion; where lengths are unequal, from the fewest to the most."""
 
@@ -102,6 +105,21 @@ def coverage_by_partners(insertions: int, repetitions: int) -> float:
     return float(np.mean([covered_by_partners(draw, insertions) for _ in range(repetitions)]))
 
 
+def coverage_with_failures(insertions: int, repetitions: int) -> float:
+    """Share of repetitions in which the mean square's interval holds the true value where insertions fail as a whole.
+
+    What such an insertion is like no other tells: where none of a sample has failed, the interval is about the others.
+    """
+    draw, held = np.random.default_rng([SEED, insertions, 1]), 0
+    true = np.log(1.0 + WRONG * (WRONG_BY - 1.0))
+    for _ in range(repetitions):
+        squares = np.exp(SIMULATOR * draw.normal(size=insertions) - 0.5 * SIMULATOR**2)
+        squares *= np.where(draw.random(insertions) < WRONG, WRONG_BY, 1.0)
+        low, high = of_log_ratio(squares, np.ones(insertions), np.ones(insertions))
+        held += bool(low <= true <= high)
+    return held / repetitions
+
+
 def main(repetitions: int = 4000) -> None:
     """Print a line for each condition, and the extremes."""
     print("lag  insertions  between  unequal  outliers   mean square   skill  median tip")
@@ -119,6 +137,9 @@ def main(repetitions: int = 4000) -> None:
     for insertions in PARTNERS:
         share = coverage_by_partners(insertions, repetitions)
         print(f"skill against the other insertions, {insertions} of them: {share:.3f}", flush=True)
+    for insertions in FEW:
+        share = coverage_with_failures(insertions, repetitions)
+        print(f"mean square, one insertion in five in a wrong branch, {insertions} of them: {share:.3f}", flush=True)
 
 
 if __name__ == "__main__":
