@@ -32,7 +32,7 @@ from tests.numbers.kept import different
 from tests.numbers.traces import RELATIVE, numbers_of, word
 from tests.studies.seeing.known import FIRST, LARGE, REFUSED, TRACED
 from tests.studies.seeing.render import Lattice, arc_of, even
-from tests.studies.seeing.scenes import Draft
+from tests.studies.seeing.scenes import Draft, less_sharp
 from tests.studies.seeing.table import found, look, row_of, scene_of, seen
 
 
@@ -181,16 +181,6 @@ def test_a_second_wire_that_is_a_copy_moved_aside_is_seen_in_part(seed):
     )  # fmt: skip
     assert curve.status is FrameStatus.TRACE_AMBIGUOUS
     assert "out of round over 10 mm" in curve.note
-
-
-def less_sharp(scene, ratio, axis):
-    """The scene as a scanner sees it whose blur is so many times as large along one axis."""
-    more = np.sqrt(ratio**2 - 1.0) * 0.85
-    frame, reference = (
-        replace(v, values=ndimage.gaussian_filter1d(v.values.astype(np.float32), more, axis=axis))
-        for v in (scene.frame, scene.reference)
-    )
-    return replace(scene, frame=frame, reference=reference)
 
 
 @pytest.mark.parametrize("ratio", [1.2, *later(1.1)])

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy import ndimage
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
@@ -523,3 +524,20 @@ def wider_ahead(rng, seed):
         along = np.linspace(0.0, 3.0, 61)
         d.others = [(d.path[-1] + along[:, None] * t, rng.uniform(0.45, 0.6), rng.uniform(0.1, 0.25) * (1 - along / 3))]
     return d.scan((8, 16)[seed // 2 % 2], reference=seed % 4 < 2)
+
+
+def less_sharp(scene, ratio, axis):
+    """The scene as a scanner sees it whose blur is so many times as large along one axis."""
+    more = np.sqrt(ratio**2 - 1.0) * 0.85
+    scans = (
+        scan and replace(scan, values=ndimage.gaussian_filter1d(scan.values.astype(np.float32), more, axis=axis))
+        for scan in (scene.frame, scene.reference)
+    )
+    return replace(scene, **dict(zip(("frame", "reference"), scans, strict=True)))
+
+
+@case("a scanner less sharp along one axis")
+def uneven_blur(rng, seed):
+    """One wire looks like two in contact."""
+    ratio = rng.uniform(1.1, 1.4)
+    return less_sharp(Draft(rng).scan((16, 8)[seed % 2], reference=seed % 4 < 3), ratio, seed % 3)
