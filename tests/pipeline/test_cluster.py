@@ -40,6 +40,11 @@ def unseen_figures() -> None:
     """Figures are drawn in full here: the workers of a scheduler do, and theirs are compared."""
 
 
+@pytest.fixture(scope="module", autouse=True)
+def few_figures() -> None:
+    """All of them, too."""
+
+
 @contextmanager
 def cluster(folder: Path) -> Iterator[tuple[str, subprocess.Popen[str]]]:
     """The address of a scheduler, and its process. It runs in another folder than the test, as on other machines."""
