@@ -17,6 +17,7 @@ from pipeline.run.stages.given import manifest_clamp
 from pipeline.simulate import together
 from pipeline.simulate.clamp import Prior, TracedFrame, _left_out, depth_from, estimated_clamp, moved
 from pipeline.simulate.evidence import posterior
+from pipeline.simulate.way import Stop, Way
 from solver import GuideWire, Insertion, Solution
 from solver.relax import base_frame
 
@@ -53,7 +54,8 @@ def replay(
 ) -> list[list[Solution]]:
     """The solver's free wire from each clamp."""
     wires = [Insertion(WIRE, None, c.entry_mm, c.direction, material_axis=c.material_axis) for c in clamps]
-    return together(wires, depths, [frame.roll_deg for frame in seen])
+    ways = [Way.reading(map(Stop, [f.index for f in seen], way, [f.roll_deg for f in seen])) for way in depths]
+    return together(wires, ways)
 
 
 def estimate(curves: Sequence[Curve], given: Clamp, prior: Prior = PRIOR) -> Clamp:
