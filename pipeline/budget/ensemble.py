@@ -13,6 +13,7 @@ from pipeline.budget.surface import displaced
 from pipeline.model import Array, Lumen, OverWire, Wall, Wire
 from pipeline.simulate import insertion_of, together, wall_of
 from pipeline.simulate.config import SolverConfig
+from pipeline.simulate.way import Way
 from solver import VesselWall
 
 NARROWEST_MM = 1e-3
@@ -25,7 +26,7 @@ class Scene:
     """What all members share.
 
     solver : with the length of the segments.     wires : nominal ones, around which the lumen is cropped.
-    catheter_mm : of the tip of a catheter in each frame.     seed : of the lumens' surfaces.
+    way : of the hand, on which the frames with a budget are read.     seed : of the lumens' surfaces.
     """
 
     wire: Wire
@@ -33,8 +34,8 @@ class Scene:
     lumen: Lumen
     solver: SolverConfig
     wires: Sequence[Array]
+    way: Way
     catheter: OverWire | None = None
-    catheter_mm: Sequence[float] | None = None
     seed: int = 0
 
     def vessel(self) -> VesselWall:
@@ -43,8 +44,8 @@ class Scene:
 
 
 def replayed(scene: Scene, ensembles: Sequence[Sequence[Member]], arc_mm: Sequence[Array]) -> list[list[Array]]:
-    """For each ensemble the wires of each frame (members, n, 3) at arc lengths (n,) from the entry; NaN for one that is
-    not at rest.
+    """For each ensemble the wires of each frame that is read (members, n, 3), at arc lengths (n,) from the entry; NaN
+    for one that is not at rest.
 
     Members that share a lumen are simulated side by side, of whichever ensemble; one lumen is held at a time.
     """
@@ -76,6 +77,6 @@ def _together(scene: Scene, vessel: VesselWall, members: Sequence[Member]) -> It
         wire = replace(scene.wire, radius_mm=max(scene.wire.radius_mm + one.narrower_mm, NARROWEST_MM))
         own = wire, scene.wall, vessel, one.clamp, scene.solver, one.config, scene.catheter
         insertions.append(insertion_of(*own))
-    depths, rolls = [one.depth_mm.tolist() for one in members], [one.roll_deg.tolist() for one in members]
-    for wires in together(insertions, depths, rolls, scene.catheter_mm):
+    ways = [scene.way.otherwise(one.depth_mm.tolist(), one.roll_deg.tolist()) for one in members]
+    for wires in together(insertions, ways):
         yield [wire.joints_mm if wire.converged and len(wire.joints_mm) > 1 else None for wire in wires]

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipeline.model import Array, Clamp, Wire
 from pipeline.simulate.config import SimulateConfig
@@ -38,7 +39,7 @@ SOURCES = (
 class Sigmas:
     """One standard deviation of every input.
 
-    clamp : (6, 6) covariance, see ``Clamp``.     depth : (frames,), mm.     said : by source, in words.
+    clamp : (6, 6) covariance, see ``Clamp``.     depth : (stops,), mm.     said : by source, in words.
     lumen, lumen_bias in mm, roll in degrees, the others as of ``Uncertainty``.
     """
 
@@ -57,15 +58,15 @@ class Sigmas:
 class Nominal(NamedTuple):
     """The insertion about which inputs are drawn.
 
-    depth_mm, roll_deg : (frames,).     config : with the friction.     traced : the depths are the traces', so that
-    the tip stays where it is seen when the clamp is moved.
+    depth_mm, roll_deg : (stops,) of the whole way of the hand.     config : with the friction.     traced : (stops,)
+    which depths are the traces', so that the tip stays where it is seen when the clamp is moved.
     """
 
     clamp: Clamp
     depth_mm: Array
     roll_deg: Array
     config: SimulateConfig
-    traced: bool
+    traced: NDArray[np.bool_]
 
 
 class Member(NamedTuple):
@@ -93,7 +94,7 @@ def sigmas_of(
 ) -> Sigmas:
     """The standard deviations of a case: what is stated, else the defaults.
 
-    stated : keys of ``Uncertainty``, and roll_deg.     depth_mm : (frames,) of the depths.     noise_mm : of the
+    stated : keys of ``Uncertainty``, and roll_deg.     depth_mm : (stops,) of the depths.     noise_mm : of the
     lumen's surface by the scan's noise.
     """
     noise = LUMEN_NOISE_VOXELS * voxel_mm if noise_mm is None else noise_mm
@@ -117,7 +118,8 @@ def sigmas_of(
     clamp = nominal.clamp
     known = clamp.covariance is not None
     said["clamp"] = f"{clamp.sigma_mm:.3f} mm across and {clamp.sigma_deg:.2f} degrees" if known else "exact"
-    said["depth"] = f"{float(np.median(depth_mm)):.2f} mm, {'traced' if nominal.traced else 'manifest'}"
+    kinds = (("traced", depth_mm[nominal.traced]), ("manifest", depth_mm[~nominal.traced]))
+    said["depth"] = " and ".join(f"{float(np.median(some)):.2f} mm, {kind}" for kind, some in kinds if len(some))
     covariance = np.array(clamp.covariance) if known else np.zeros((6, 6))
     return Sigmas(covariance, depth_mm, **values, said=said)
 

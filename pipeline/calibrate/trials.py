@@ -7,11 +7,12 @@ import numpy as np
 
 from pipeline.calibrate.unknowns import FRICTION, MOST_CURVED, REST, ROLL, bent, wall_factor
 from pipeline.model import Array, Clamp, OverWire, Wall, Wire
-from pipeline.simulate import inserted
+from pipeline.simulate import inserted, together
 from pipeline.simulate.clamp import STEP_MM, STEP_RAD, TIP_VOXELS, Prior, TracedFrame, depth_from, moved
 from pipeline.simulate.config import SolverConfig
 from pipeline.simulate.resolution import lengths_mm
-from solver import Insertion, Insertions, Solution, VesselWall
+from pipeline.simulate.way import Stop, Way
+from solver import Insertion, Solution, VesselWall
 
 LUMEN_VOXELS = 0.15
 """Standard deviation, voxels, of the offset of the whole wall from where it was segmented: it is hard to tell from the
@@ -27,6 +28,7 @@ UNKNOWN_ROLL_DEG = 104.0
 class Trial:
     """An insertion with its traces. vessel : the wall at stiffness 1.     wall : as stated.     given, prior : clamp.
 
+    seen : the frames that are fitted.     passed : those whose trace is refused, which the wire went through as well.
     roll_free : the roll is not stated.     roll_sigma_deg : how well it is where it is: an offset that all insertions
     share is told from what each was turned by mistake.     force_N : (frames,) measured push, NaN where it is not;
     force_sigma_N : its standard deviation.
@@ -45,6 +47,7 @@ class Trial:
     catheter: OverWire | None = None
     force_N: Array | None = None
     force_sigma_N: float = 1e-3
+    passed: tuple[Stop, ...] = ()
 
     @property
     def sigmas(self) -> Array:
@@ -81,26 +84,15 @@ def insertion_at(trial: Trial, point: Point, solver: SolverConfig) -> Insertion:
     return inserted(vessel, bent(wire, point.shared), moved(trial.given, point.own[:5]), settings, 1.0, trial.catheter)
 
 
-def rolls_at(trial: Trial, point: Point) -> list[float]:
-    """Roll of each frame, degrees."""
+def way_at(trial: Trial, point: Point) -> Way:
+    """The way of the hand with other parameters, on which the frames with a trace are read."""
     turn = float(point.own[6]) + (0.0 if trial.roll_free else point.shared.get(ROLL, 0.0))
-    return [frame.roll_deg + turn for frame in trial.seen]
+    each = zip(trial.seen, depths_at(trial, point), strict=True)
+    read = [Stop(frame.index, depth, frame.roll_deg, frame.catheter_mm) for frame, depth in each]
+    return Way.reading(read, trial.passed, sheathed=trial.catheter is not None).turned(turn)
 
 
 def replayed(pairs: Sequence[tuple[Trial, Point]], solver: SolverConfig) -> list[list[Solution]]:
-    """The wires of many insertions, side by side; those with a catheter, which cannot be, one after the other."""
-    ways = [
-        (insertion_at(trial, point, solver), depths_at(trial, point), rolls_at(trial, point)) for trial, point in pairs
-    ]
-    found: list[list[Solution]] = [[] for _ in ways]
-    plain = [i for i, (trial, _) in enumerate(pairs) if trial.catheter is None]
-    if plain:
-        insertions, depths, rolls = zip(*(ways[i] for i in plain), strict=True)
-        for i, wires in zip(plain, Insertions(insertions).to_depths(list(depths), list(rolls)), strict=True):
-            found[i] = wires
-    for i, (trial, _) in enumerate(pairs):
-        if trial.catheter is not None:
-            insertion, depths_mm, rolls_deg = ways[i]
-            tips = [min(f.catheter_mm, mm) for f, mm in zip(trial.seen, depths_mm, strict=True)]
-            found[i] = list(insertion.to_depths(depths_mm, rolls_deg, tips))
-    return found
+    """The wires of many insertions at their traced frames, side by side."""
+    insertions = [insertion_at(trial, point, solver) for trial, point in pairs]
+    return together(insertions, [way_at(trial, point) for trial, point in pairs], threads=None)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from pipeline.model import Clamp, Lumen, OverWire, Wall, Wire
 from pipeline.ranges import Profile
 from pipeline.simulate.config import COARSEST_MM, Segment, SimulateConfig, SolverConfig
+from pipeline.simulate.way import Way
 from solver import Catheter, Grid, GuideWire, Insertion, Insertions, Solution, VesselWall
 
 __all__ = ["LEVELS", "altered", "guide_wire", "inserted", "insertion_of", "simulate", "together", "wall_of"]
@@ -51,35 +52,32 @@ def guide_wire(wire: Wire, segment_mm: Segment, bending_scale: float = 1.0) -> G
     )
 
 
-def simulate(
-    insertion: Insertion,
-    depths_mm: Sequence[float],
-    roll_deg: Sequence[float],
-    catheter_mm: Sequence[float] | None = None,
-) -> Iterator[Solution]:
-    """Yield the simulated wire at each depth (mm from the clamp to the tip), roll and catheter, in the order given.
+def simulate(insertion: Insertion, way: Way) -> Iterator[Solution]:
+    """Yield the simulated wire at each stop of a way that is read, in its order; all stops are gone through.
 
     A depth that cannot be reached is a status, not an exception; the last good state goes on to the next depth.
+    ValueError where the solver refuses the way.
     """
-    return insertion.to_depths(list(depths_mm), list(roll_deg), 0.0 if catheter_mm is None else list(catheter_mm))
+    return iter(way.of(insertion.to_depths(way.depths_mm, way.rolls_deg, way.tips_mm)))
 
 
-def together(
-    insertions: Sequence[Insertion],
-    depths_mm: Sequence[Sequence[float]],
-    roll_deg: Sequence[float] | Sequence[Sequence[float]],
-    catheter_mm: Sequence[float] | None = None,
-) -> list[list[Solution]]:
-    """The wires of several insertions, each with its own depths, with the same catheter; side by side.
+def together(insertions: Sequence[Insertion], ways: Sequence[Way], threads: int | None = 1) -> list[list[Solution]]:
+    """The wires of several insertions, each on its own way, at its stops that are read.
 
-    roll_deg : of every depth, the same for all or for each insertion its own.
+    They are made side by side; those with a catheter, which cannot be, one after the other.     threads : of those side
+    by side; None is one per core.
     """
-    rolls = np.broadcast_to(np.asarray(roll_deg, dtype=np.float64), np.shape(depths_mm)).tolist()
-    if catheter_mm is None:
-        return Insertions(insertions, threads=1).to_depths(depths_mm, rolls)
-    tips = [[min(tip, mm) for tip, mm in zip(catheter_mm, depths, strict=True)] for depths in depths_mm]
-    ways = zip(insertions, depths_mm, rolls, tips, strict=True)
-    return [list(one.to_depths(depths, roll, tip)) for one, depths, roll, tip in ways]
+    found: list[list[Solution]] = [[] for _ in ways]
+    plain = [i for i, way in enumerate(ways) if not way.sheathed]
+    if plain:
+        depths, rolls = [ways[i].depths_mm for i in plain], [ways[i].rolls_deg for i in plain]
+        beside = Insertions([insertions[i] for i in plain], threads=threads).to_depths(depths, rolls)
+        for i, wires in zip(plain, beside, strict=True):
+            found[i] = [*ways[i].of(wires)]
+    for i, way in enumerate(ways):
+        if way.sheathed:
+            found[i] = [*simulate(insertions[i], way)]
+    return found
 
 
 @lru_cache(maxsize=1)

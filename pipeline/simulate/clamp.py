@@ -14,6 +14,7 @@ manifest states, and what it may be makes the rest less certain.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +22,7 @@ from numpy.typing import NDArray
 from pipeline.arrays.polyline import angle_deg, at_arc, tangents
 from pipeline.model import Array, Clamp, Curve
 from pipeline.simulate.departures import departed
-from pipeline.simulate.evidence import TraceSamples, covariance_of, disagreeing, posterior
+from pipeline.simulate.evidence import TraceSamples, covariance_of, disagreeing, posterior, rougher, roughness_mm
 from solver import Solution
 
 REACH_MM = 10.0
@@ -133,6 +134,21 @@ def _linear(wires: Sequence[Solution], trace: TraceSamples, steps: Array) -> tup
     return np.einsum("nij,nj->ni", across, trace.points_mm - here), jacobian, sane
 
 
+_Seen = tuple[list[Array], list[Array], NDArray[np.bool_]]
+"""Residuals and derivatives of each frame, and which frames can be used."""
+
+
+class _Round(NamedTuple):
+    """A step of the fit: the next values, their covariance, the frames that disagree, how many were used, and how rough
+    their traces are beyond what they state, mm."""
+
+    goal: Array
+    covariance: Array
+    out: list[int]
+    used: int
+    rough_mm: float
+
+
 @dataclass(frozen=True)
 class _Fit:
     """What stays the same from step to step."""
@@ -144,7 +160,7 @@ class _Fit:
     replay: Replay
     voxel_mm: float
 
-    def look(self, at: Array) -> tuple[list[Array], list[Array], NDArray[np.bool_]]:
+    def look(self, at: Array) -> _Seen:
         """Residuals and derivatives of each frame at values (5 + frames,), and which frames can be used."""
         steps = np.array([STEP_MM] * 3 + [STEP_RAD] * 2 + [STEP_DEPTH_MM])
         clamps = [moved(self.given, at[:5] + d) for d in (np.zeros(5), *np.diag(steps[:5]), np.zeros(5))]
@@ -161,22 +177,33 @@ class _Fit:
             jacobian.append(wide)
         return residual, jacobian, good
 
-    def round(self, at: Array) -> tuple[Array, Array, list[int], int]:
-        """The next values, their covariance, the frames that disagree and how many were used."""
-        residual, jacobian, good = self.look(at)
+    def round(self, at: Array) -> _Round:
+        """The next step; where most frames disagree and their traces are rough, with that as an error of theirs."""
+        seen = self.look(at)
+        found = self.step(at, seen, self.traces)
+        if len(found.out) < found.used:
+            return found
+        good = [i for i, used in enumerate(seen[2]) if used]
+        rough = roughness_mm([seen[0][i] for i in good], [self.traces[i] for i in good], self.voxel_mm)
+        return self.step(at, seen, [replace(trace, rough_mm=rough) for trace in self.traces]) if rough else found
+
+    def step(self, at: Array, seen: _Seen, traces: Sequence[TraceSamples]) -> _Round:
+        """The next values by what was ``seen`` at those before, without frames that disagree."""
+        residual, jacobian, good = seen
         out: list[int] = []
         while True:
             use = [i for i in range(len(good)) if good[i] and i not in out]
+            rough = traces[0].rough_mm
             if not use:
-                return np.zeros(len(at)), np.diag(self.sigmas**2), out, 0
-            used = [self.traces[i] for i in use]
+                return _Round(np.zeros(len(at)), np.diag(self.sigmas**2), out, 0, rough)
+            used = [traces[i] for i in use]
             stacked = [np.concatenate([a[i] for i in use]) for a in (residual, jacobian)]
             noise = covariance_of(used, self.voxel_mm)
             held = np.arange(len(at)) == ALONG
             mean, spread, left = posterior(stacked[0], stacked[1], noise, self.sigmas, held, at)
             worst = disagreeing(left, used, self.voxel_mm)
             if worst is None or len(use) < 3:
-                return mean, spread, out, len(use)
+                return _Round(mean, spread, out, len(use), rough)
             out.append(use[worst])
 
 
@@ -195,15 +222,17 @@ def estimated_clamp(seen: Sequence[TracedFrame], given: Clamp, prior: Prior, rep
     fit = _Fit(chosen, samples_of(chosen), given, sigmas, replay, voxel_mm)
     at = np.zeros(len(sigmas))
     for number in range(ROUNDS):
-        goal, covariance, out, used = fit.round(at)
-        step = (goal - at) * (1.0 if number < WHOLE_STEPS else 0.5)
+        last = fit.round(at)
+        step = (last.goal - at) * (1.0 if number < WHOLE_STEPS else 0.5)
         at = at + step
-        if np.all(np.abs(step) <= SETTLED * np.sqrt(np.diag(covariance))):
+        if np.all(np.abs(step) <= SETTLED * np.sqrt(np.diag(last.covariance))):
             break
     found = moved(given, at[:5])
-    found = replace(found, covariance=_in_space(given, covariance[:5, :5]))
+    found = replace(found, covariance=_in_space(given, last.covariance[:5, :5]))
     contradiction = departed(given, found, prior.sigma_mm, prior.direction_sigma_deg)
-    return _told(given, found, [chosen[i].index for i in out], used, contradiction)
+    told = _told(given, found, [chosen[i].index for i in last.out], last.used, contradiction)
+    rough = rougher(last.rough_mm, fit.traces, voxel_mm)
+    return replace(told, warning="; ".join(filter(None, (told.warning, rough))))
 
 
 def _in_space(clamp: Clamp, covariance: Array) -> Array:

@@ -29,6 +29,9 @@ MODEL_VOXELS, MODEL_MM = 0.1, 8.0
 """How far (voxels) the simulated wire may be off at this distance (mm) from the clamp, through errors farther on, such
 as the lumen's wall."""
 MODEL_SHARED = 0.5
+THIRD, ROUGH = 20.0, 1.4
+"""Variance of third differences of independent numbers of variance 1; and how many times as rough as their standard
+deviations allow traces may be: at 1.45 chance does not explain 20 points of one; those of scans are splines, 0.1."""
 SURPRISING = 5.0
 """A frame disagrees where its sum of squares is this many standard deviations above its expected value."""
 
@@ -38,7 +41,8 @@ class TraceSamples:
     """The points of a frame's trace that are fitted.
 
     arc_mm (n,), points_mm (n, 3).     sigma_mm : (n,) across the wire, NaN where unknown.     knot_mm : distance of the
-    spline's knots, NaN where unknown.
+    spline's knots, NaN where unknown.     rough_mm : standard deviation of errors that are independent from point to
+    point, beyond those of sigma_mm.
     """
 
     index: int
@@ -46,6 +50,7 @@ class TraceSamples:
     points_mm: Array
     sigma_mm: Array
     knot_mm: float
+    rough_mm: float = 0.0
 
     @classmethod
     def of(cls, index: int, curve: Curve, arc_mm: Array) -> Self:
@@ -61,7 +66,7 @@ def _modes(trace: TraceSamples, voxel_mm: float) -> Array:
     return np.asarray(MODEL_VOXELS * voxel_mm * np.concatenate([s**2, s**3], axis=1))
 
 
-def _sigma(trace: TraceSamples, voxel_mm: float) -> Array:
+def sigma_across(trace: TraceSamples, voxel_mm: float) -> Array:
     """Standard deviation (n,), mm, of each point across the wire, with the excess at the beginning of the trace."""
     sigma = np.where(np.isfinite(trace.sigma_mm), trace.sigma_mm, UNKNOWN_VOXELS * voxel_mm)
     return np.asarray(sigma * np.sqrt(1.0 + START * np.exp(-2.0 * (trace.arc_mm / _knot(trace)) ** 2)))
@@ -89,12 +94,42 @@ def covariance_of(traces: Sequence[TraceSamples], voxel_mm: float) -> Array:
 def covariance_of_traces(traces: Sequence[TraceSamples], voxel_mm: float) -> Array:
     """Covariance, mm^2, of one component at all points of all frames: the errors of the traces alone."""
     arc = np.concatenate([trace.arc_mm for trace in traces])
-    sigma = np.concatenate([_sigma(trace, voxel_mm) for trace in traces])
+    sigma = np.concatenate([sigma_across(trace, voxel_mm) for trace in traces])
     all_bells, own_bells = np.block([[_bell(a, b) for b in traces] for a in traces]), [_bell(a, a) for a in traces]
     shared = np.sqrt(SHARED_FARTHER + (SHARED - SHARED_FARTHER) * np.exp(-0.5 * (arc / SHARED_MM) ** 2))
     alone = np.sqrt(1.0 - shared**2)
     bells = all_bells * np.outer(shared, shared) + block_diag(*own_bells) * np.outer(alone, alone)
-    return np.asarray(((1.0 - OWN) * bells + OWN * np.eye(len(arc))) * np.outer(sigma, sigma))
+    rough = np.concatenate([np.full(len(trace.arc_mm), trace.rough_mm) for trace in traces])
+    return np.asarray(((1.0 - OWN) * bells + OWN * np.eye(len(arc))) * np.outer(sigma, sigma) + np.diag(rough**2))
+
+
+def roughness_mm(left: Sequence[Array], traces: Sequence[TraceSamples], voxel_mm: float) -> float:
+    """How rough traces are beyond what their standard deviations allow, mm: the median of theirs; 0 where they are not.
+
+    left : residuals (n, 3) of each, across the wire. Of their third differences hardly anything is smooth: a wire that
+    is held elsewhere, or is otherwise bent, makes no trace rough. Less than ROUGH times what is allowed is 0.
+    """
+    found = []
+    for mine, trace in zip(left, traces, strict=True):
+        third = np.diff(np.eye(len(mine)), n=3, axis=0)
+        if not len(third):
+            continue
+        seen = 0.5 * float(np.mean(np.sum((third @ mine) ** 2, axis=1)))
+        allowed = float(np.mean(np.sum(third @ covariance_of_traces([trace], voxel_mm) * third, axis=1)))
+        found.append((seen - allowed) / THIRD if seen > ROUGH**2 * allowed else 0.0)
+    return float(np.sqrt(np.median(found))) if found else 0.0
+
+
+def rougher(rough_mm: float, traces: Sequence[TraceSamples], voxel_mm: float) -> str:
+    """A warning of traces that are rougher than they state, mm (``roughness_mm``); empty where they are not."""
+    if not rough_mm:
+        return ""
+    sigma = float(np.median(np.concatenate([sigma_across(trace, voxel_mm) for trace in traces])))
+    return (
+        f"the traces are rougher than they are known to be: near the entry they scatter by {rough_mm:.2g} mm from "
+        f"point to point, where a standard deviation of {sigma:.2g} mm leaves {np.sqrt(OWN) * sigma:.2g} mm; the "
+        "clamp was estimated with that, and is the less certain for it: smooth them"
+    )
 
 
 def posterior(

@@ -49,7 +49,7 @@ ALONG_Z = np.column_stack([np.zeros(61), np.zeros(61), np.linspace(0.0, 30.0, 61
 def nominal(*, traced: bool = True, friction: float = 0.0) -> Nominal:
     covariance = np.diag([0.04, 0.01, 0.01, 1e-4, 1e-4, 0.0])
     clamp = Clamp(np.zeros(3), np.array([0.0, 0.0, 1.0]), covariance=covariance)
-    return Nominal(clamp, np.array([10.0, 20.0]), np.zeros(2), SimulateConfig(friction=friction), traced)
+    return Nominal(clamp, np.array([10.0, 20.0]), np.zeros(2), SimulateConfig(friction=friction), np.full(2, traced))
 
 
 def sigmas(of: Nominal, **stated: float) -> Sigmas:

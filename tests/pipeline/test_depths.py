@@ -24,8 +24,8 @@ from pipeline.run.stages.depths import (
 from pipeline.run.stages.dim_ends import barely_seen, faint_ends, own_dim_ends
 from pipeline.run.stages.known import Frame
 from pipeline.run.stages.repeated import once
-from pipeline.run.stages.simulate import with_depth
 from pipeline.run.stages.trace import _last_curve, _Part
+from pipeline.run.stages.way import with_depth
 from pipeline.simulate.clamp import Clamp
 from pipeline.status import FrameStatus
 from pipeline.trace import DIM_FROM_TIP, FAINT_BEYOND, GOES_ON, of_catheter, of_length

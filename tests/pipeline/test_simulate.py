@@ -15,7 +15,7 @@ from pipeline.run.stages.covered import too_thick
 from pipeline.run.stages.known import Frame
 from pipeline.run.stages.load import each_frame
 from pipeline.run.stages.simulate import _pressed_deep, judged
-from pipeline.simulate import altered, guide_wire, insertion_of, resolution, simulate
+from pipeline.simulate import altered, guide_wire, insertion_of, resolution
 from pipeline.simulate.config import SimulateConfig, SolverConfig
 from pipeline.study.manifest import Case, ManifestError, read_manifest
 from solver import GuideWire, Insertion, Solution, VesselWall
@@ -54,7 +54,7 @@ def wide_open() -> Lumen:
 def run(case: Case, roll: float, depths: tuple[float, ...] = (6.0, 12.0)) -> list[Solution]:
     clamp = Clamp(np.zeros(3), np.array([0.0, 0.0, 1.0]), np.array(case.material_axis))
     insertion = insertion_of(case.wire, case.wall, wide_open(), clamp, SolverConfig(segment_mm=0.5))
-    return list(simulate(insertion, depths, [roll] * len(depths)))
+    return list(insertion.to_depths(depths, roll))
 
 
 def test_a_study_can_give_the_wire_a_weight(case: Case) -> None:
@@ -62,7 +62,7 @@ def test_a_study_can_give_the_wire_a_weight(case: Case) -> None:
     heavy = replace(case.wire, weight_N_per_mm=1e-5, rest_curvature_per_mm=0.0, bending_stiffness_N_mm2=0.6)
     clamp = Clamp(np.zeros(3), np.array([0.0, 0.0, 1.0]), np.array(case.material_axis), np.array([0.0, 2.0, 0.0]))
     insertion = insertion_of(heavy, case.wall, wide_open(), clamp, SolverConfig(segment_mm=0.5))
-    last = list(simulate(insertion, [12.0], [0.0]))[-1]
+    last = list(insertion.to_depths([12.0]))[-1]
     assert last.joints_mm[-1, 1] == pytest.approx(1e-5 * 12.0**4 / (8 * 0.6), rel=0.01)
 
 
@@ -167,9 +167,7 @@ def test_a_wire_that_comes_through_the_wall_fails_its_frame(case: Case) -> None:
     bent = replace(case.wire, rest_curvature_per_mm=[(0.0, 0.3), (6.0, 0.3), (6.0, 0.0)])
     clamp = Clamp(np.zeros(3), np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0]))
     wall = replace(case.wall, stiffness_N_mm2=1.0)
-    *_, last = simulate(
-        insertion_of(bent, wall, lumen, clamp, SolverConfig(segment_mm=0.5)), [4.0, 8.0, 15.0], [0.0] * 3
-    )
+    *_, last = insertion_of(bent, wall, lumen, clamp, SolverConfig(segment_mm=0.5)).to_depths([4.0, 8.0, 15.0])
     frame = Frame(0, depth_mm=15.0, simulated=last).failed("simulate", last.status)
     assert frame.status == "through_wall"
     assert "through the wall" in frame.sentence

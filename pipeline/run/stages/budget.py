@@ -1,10 +1,11 @@
 """The budget of a case: its ensemble, what that says of every frame, and the table by source."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipeline.arrays.polyline import at_arc, samples
 from pipeline.budget import (
@@ -29,10 +30,12 @@ from pipeline.budget.verdict import ROUND
 from pipeline.compare.metrics import rms, scored
 from pipeline.model import Array, arc_length
 from pipeline.run.stages.known import Context, Frame, Known
+from pipeline.run.stages.way import by_trace, way_of
 from pipeline.simulate import altered
 from pipeline.simulate.clamp import TIP_VOXELS, ahead_of
 from pipeline.simulate.evidence import UNKNOWN_VOXELS, TraceSamples
 from pipeline.simulate.resolution import lengths_mm
+from pipeline.simulate.way import Way
 
 AT_REST, RARE = 0.9, 0.05
 NOT_OURS = (
@@ -60,7 +63,7 @@ def budgeted(run: Context, known: Known) -> Known:
         try:
             alike = work.alone() if settings.members_alone else {}
             ensemble, *each = work.ensembles([(work.sigmas, settings.members), *alike.values()])
-            budgets = _with_releases(frames, work.budgets_of(ensemble))
+            budgets = _with_releases(_snapped(known, work.way), work.budgets_of(ensemble))
             found = dict(zip(work.numbers, budgets, strict=True))
             rank = work.rank(ensemble, budgets)
             rows = work.by_source(found, dict(zip(alike, each, strict=True))) if settings.members_alone else []
@@ -98,11 +101,28 @@ def _rare(rank: float, count: int) -> list[str]:
     ]
 
 
-def _with_releases(frames: Sequence[Frame], budgets: Sequence[Budget | None]) -> list[Budget | None]:
+def _snapped(known: Known, way: Way) -> list[bool]:
+    """Of each frame that is read, whether the simulated wire let go since the one before, be it in one passed by."""
+    found, since = [], False
+    for stop, read in zip(way.stops, way.read, strict=True):
+        solved = known.frames[stop.frame].solved
+        since = since or (solved is not None and bool(solved.snaps))
+        if read:
+            found.append(since)
+            since = False
+    return found
+
+
+def _with_releases(snapped: Sequence[bool], budgets: Sequence[Budget | None]) -> list[Budget | None]:
     """The budgets, each with what became of a release (``budget.shapes.releases``)."""
-    snapped = [frame.solved is not None and bool(frame.solved.snaps) for frame in frames]
     told = releases(snapped, [None if budget is None else budget.shapes for budget in budgets])
     return [None if b is None else replace(b, released=word) for b, word in zip(budgets, told, strict=True)]
+
+
+def _by_traces(stops: Sequence[Frame], read: Collection[int], source: str) -> NDArray[np.bool_]:
+    """Which depths on the way are the traces' (stops,): none unless all of the frames that are ``read`` are traced."""
+    every = all(frame.traced for frame in stops if frame.index in read)
+    return np.array([every and by_trace(frame, source) for frame in stops], dtype=bool)
 
 
 class Work:
@@ -113,30 +133,30 @@ class Work:
         self.run, self.frames, self.numbers = run, frames, [frame.index for frame in frames]
         self.voxel = float(np.mean(known.vessel.distance.spacing_mm))
         friction = case.wall.friction if config.simulate.friction is None else config.simulate.friction
-        depth, roll = (np.array([getattr(f, name) for f in frames]) for name in ("depth_mm", "roll_deg"))
-        traced = config.simulate.depth == "traced" and all(f.traced for f in frames)
+        self.way = way_of(run, known.frames, frames)
+        stops = [known.frames[stop.frame] for stop in self.way.stops]
+        traced = _by_traces(stops, self.numbers, config.simulate.depth)
+        depth, roll = np.array(self.way.depths_mm), np.array(self.way.rolls_deg)
         self.nominal = Nominal(known.held, depth, roll, replace(config.simulate, friction=friction), traced)
         stated = {"roll_deg": case.roll_sigma_deg, **asdict(case.uncertainty)}
         noise = known.vessel.levels.get("wall_noise_mm")
-        self.sigmas = sigmas_of(stated, self.nominal, case.wire, self._depth_sigmas(), self.voxel, noise)
+        self.sigmas = sigmas_of(stated, self.nominal, case.wire, self._depth_sigmas(stops), self.voxel, noise)
         self.seen = [self._seen(frame) for frame in frames]
-        wires = [frame.simulated.joints_mm for frame in frames if frame.simulated is not None]
+        wires = [frame.simulated.joints_mm for frame in stops if frame.simulated is not None]
         traces = [frame.curve.points_mm for frame in frames if frame.curve is not None and frame.traced]
         # the longest segments will do: their error is common to all members, and num_mm has it
         lengths = lengths_mm(config.solver.segment_mm, altered(case.wire, config.simulate).rest_curvature_per_mm)
         segment = lengths[0] if config.solver.segment_mm == "auto" else known.segment_mm
         solver = replace(config.solver, segment_mm=segment, finest_mm=config.solver.step_mm)
-        tips = [frame.catheter_mm for frame in frames] if case.catheter else None
         shared = case.wire, case.wall, known.vessel, solver, [*wires, *traces]
-        self.scene = Scene(*shared, case.catheter, tips, config.budget.seed)
+        self.scene = Scene(*shared, self.way, case.catheter, config.budget.seed)
 
-    def _depth_sigmas(self) -> Array:
-        """Standard deviation (frames,) of each frame's depth, mm."""
-        if not self.nominal.traced:
-            stated = self.run.case.insertion_sigma_mm
-            return np.full(len(self.frames), INSERTION_MM if stated is None else stated)
-        tips = [np.nan_to_num(f.curve.tip_sigma_mm) for f in self.frames if f.curve is not None]
-        return np.hypot(tips, TIP_VOXELS * self.voxel)
+    def _depth_sigmas(self, stops: Sequence[Frame]) -> Array:
+        """Standard deviation (stops,) of the depth of each frame on the way, mm."""
+        given = self.run.case.insertion_sigma_mm
+        tips = [0.0 if f.curve is None else np.nan_to_num(f.curve.tip_sigma_mm) for f in stops]
+        own = np.hypot(tips, TIP_VOXELS * self.voxel)
+        return np.where(self.nominal.traced, own, INSERTION_MM if given is None else given)
 
     def _seen(self, frame: Frame) -> FrameSample:
         """A frame's wires at the points at which it was compared."""

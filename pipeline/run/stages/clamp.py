@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from pipeline.model import Clamp
 from pipeline.run.calibrated import data_of
 from pipeline.run.log import Log
@@ -12,11 +14,13 @@ from pipeline.run.stages.load import open_case
 from pipeline.run.stages.roll import with_fitted_roll
 from pipeline.run.stages.segment import segment_vessel
 from pipeline.run.stages.trace import trace_frames
+from pipeline.run.stages.way import passed_at
 from pipeline.simulate import altered, insertion_of, together
 from pipeline.simulate.clamp import TracedFrame, estimated_clamp
 from pipeline.simulate.departures import beside, departed
 from pipeline.simulate.evidence import UNKNOWN_VOXELS
 from pipeline.simulate.resolution import lengths_mm
+from pipeline.simulate.way import Stop, Way
 from pipeline.study.manifest import Case
 from solver import Solution
 
@@ -70,5 +74,17 @@ def _replayed(
     insertions = [
         insertion_of(case.wire, case.wall, lumen, clamp, settings, config.simulate, case.catheter) for clamp in clamps
     ]
-    tips = [frame.catheter_mm for frame in seen] if case.catheter else None
-    return together(insertions, depths, [frame.roll_deg for frame in seen], tips)
+    through = _passed(run, known, seen)
+    stops = [[Stop(f.index, mm, f.roll_deg, f.catheter_mm) for f, mm in zip(seen, way, strict=True)] for way in depths]
+    return together(insertions, [Way.reading(way, through, sheathed=case.catheter is not None) for way in stops])
+
+
+def _passed(run: Context, known: Known, seen: Sequence[TracedFrame]) -> list[Stop]:
+    """The frames gone through between those that are fitted, which are the least deep where there are many.
+
+    Of deeper ones neither the traced nor the refused ones are then gone through.
+    """
+    every = {frame.index for frame in seen_in(known.frames)}
+    through = passed_at(known.frames, every, run.config.simulate.depth, manifest_clamp(run, known)[0])
+    deepest = max(frame.curve.length_mm for frame in seen) if len(seen) < len(every) else np.inf
+    return [stop for stop in through if stop.depth_mm <= deepest]

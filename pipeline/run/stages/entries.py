@@ -13,8 +13,10 @@ from pipeline.compare.metrics import DISTAL_MM, Pair, VesselAxis, distal, pair_o
 from pipeline.model import Clamp
 from pipeline.run.stages.given import manifest_clamp
 from pipeline.run.stages.known import Context, Frame, Known
+from pipeline.run.stages.way import passed_at, stop_of
 from pipeline.simulate import insertion_of, together
 from pipeline.simulate.clamp import depth_from
+from pipeline.simulate.way import Way
 from solver import Solution
 
 Entry = tuple[Clamp, str]
@@ -37,7 +39,7 @@ def _entries(run: Context, known: Known) -> dict[tuple[str, str], Entry]:
 
 def replayed_entries(run: Context, known: Known) -> list[list[Solution]]:
     """The wires of each frame from four entries, with the segments of the case."""
-    case, config, lumen, frames = run.case, run.config, known.lumen, _frames(known)
+    case, config, lumen = run.case, run.config, known.lumen
     assert lumen is not None
     entries = _entries(run, known).values()
     if not entries:
@@ -45,9 +47,14 @@ def replayed_entries(run: Context, known: Known) -> list[list[Solution]]:
     solver = replace(config.solver, segment_mm=known.segment_mm)
     shared = solver, config.simulate, case.catheter
     insertions = [insertion_of(case.wire, case.wall, lumen, clamp, *shared) for clamp, _ in entries]
-    tips = [frame.catheter_mm for frame in frames] if case.catheter else None
-    depths = [[_depth(frame, *entry) for frame in frames] for entry in entries]
-    return together(insertions, depths, [frame.roll_deg for frame in frames], tips)
+    return together(insertions, [_way(run, known, *entry) for entry in entries])
+
+
+def _way(run: Context, known: Known, clamp: Clamp, depth: str) -> Way:
+    """The way of the hand from one of the entries."""
+    own = [replace(frame, depth_mm=_depth(frame, clamp, depth)) for frame in _frames(known)]
+    through = passed_at(known.frames, {frame.index for frame in own}, depth, clamp)
+    return Way.reading(map(stop_of, own), through, sheathed=run.case.catheter is not None)
 
 
 def four_entries(

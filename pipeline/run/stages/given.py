@@ -8,6 +8,7 @@ from pipeline.budget.inputs import ROLL_DEG
 from pipeline.calibrate.trials import Trial
 from pipeline.model import Clamp, Curve
 from pipeline.run.stages.known import Context, Frame, Known
+from pipeline.run.stages.way import passed_at
 from pipeline.simulate.clamp import Prior, TracedFrame
 from pipeline.status import FrameStatus
 from solver import VesselWall
@@ -47,11 +48,14 @@ def manifest_clamp(run: Context, known: Known) -> tuple[Clamp, Prior, float]:
     return given, Prior(sigma, case.entry_direction_sigma_deg), voxel
 
 
-def trial_of(run: Context, known: Known, frames: Sequence[Frame], *, roll_free: bool) -> Trial:
-    """The insertion as calibration takes it: the trusted traces of these frames, along their whole length."""
+def trial_of(run: Context, known: Known, frames: Sequence[Frame], *, roll_free: bool, only: int | None = None) -> Trial:
+    """The insertion as calibration takes it: the trusted traces of these frames, along their whole length.
+
+    frames : of the whole insertion.     only : the number of the one frame whose trace is fitted; None is all.
+    """
     case = run.case
     given, prior, voxel_mm = manifest_clamp(run, known)
-    trusted = [frame for frame in frames if frame.trusted_curve is not None]
+    trusted = [frame for frame in frames if frame.trusted_curve is not None and only in (None, frame.index)]
     force = None if case.push_force_N is None else np.array([case.push_force_N[frame.index] for frame in trusted])
     return Trial(
         name=case.id,
@@ -61,6 +65,7 @@ def trial_of(run: Context, known: Known, frames: Sequence[Frame], *, roll_free: 
         given=given,
         prior=prior,
         seen=tuple(seen_in(trusted)),
+        passed=tuple(passed_at(frames, {frame.index for frame in trusted}, run.config.simulate.depth, given)),
         voxel_mm=voxel_mm,
         roll_free=roll_free,
         roll_sigma_deg=ROLL_DEG if case.roll_sigma_deg is None else case.roll_sigma_deg,

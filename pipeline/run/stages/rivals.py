@@ -13,6 +13,7 @@ import numpy as np
 from pipeline.arrays.polyline import at_arc, samples
 from pipeline.model import Array
 from pipeline.run.stages.known import Context, Frame, Known
+from pipeline.run.stages.way import way_of
 from pipeline.simulate import insertion_of, simulate
 from pipeline.simulate.config import SimulateConfig
 
@@ -101,7 +102,6 @@ def rival_wires(run: Context, known: Known, way: SimulatedVariant) -> Wires:
         insertion = insertion_of(case.wire, case.wall, lumen, clamp, settings, way.config, catheter)
     except ValueError:
         return [None] * len(frames)
-    tips = [min(f.catheter_mm, f.depth_mm) for f in frames] if catheter else None
-    rolls = [frame.roll_deg + way.turn_deg for frame in frames]
-    wires = simulate(insertion, [frame.depth_mm for frame in frames], rolls, tips)
+    whole = replace(way_of(run, known.frames, frames).turned(way.turn_deg), sheathed=catheter is not None)
+    wires = simulate(insertion, whole)
     return [np.asarray(wire.joints_mm) if wire.converged else None for wire in wires]

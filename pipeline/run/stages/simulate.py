@@ -15,8 +15,8 @@ from pipeline.run.stages.in_itself import not_in_itself
 from pipeline.run.stages.known import Context, Frame, Known
 from pipeline.run.stages.others import frames_of_others
 from pipeline.run.stages.roll import with_fitted_roll
+from pipeline.run.stages.way import way_of, with_depth
 from pipeline.simulate import LEVELS, altered, insertion_of, simulate, wall_of
-from pipeline.simulate.clamp import depth_from
 from pipeline.simulate.resolution import LARGEST_JOINT_TURN_DEG, Resolved, lengths_mm, resolve
 from pipeline.status import FrameStatus, StageError
 from reports.case_files import counted
@@ -104,10 +104,7 @@ def _inserted(
     finest_mm = config.solver.finest_mm if refined else config.solver.step_mm
     settings = replace(config.solver, segment_mm=segment_mm, finest_mm=finest_mm)
     shared = known.vessel, known.held, settings, config.simulate, case.catheter
-    # a wire that is traced a little short of the catheter's tip ends with it
-    tips = [min(f.catheter_mm, f.depth_mm) for f in frames] if case.catheter else None
-    depths, rolls = [f.depth_mm for f in frames], [f.roll_deg for f in frames]
-    found = simulate(insertion_of(case.wire, case.wall, *shared), depths, rolls, tips)
+    found = simulate(insertion_of(case.wire, case.wall, *shared), way_of(run, known.frames, frames))
     return list(_noted(part.log, frames, found, len(known.frames))), part.log
 
 
@@ -173,23 +170,3 @@ def _told(frame: int, snap: Snap) -> str:
 
 def _with_depths(run: Context, known: Known, clamp: Clamp) -> tuple[Frame, ...]:
     return tuple(with_depth(frame, run.config.simulate.depth, clamp) for frame in known.frames)
-
-
-def with_depth(frame: Frame, source: str, clamp: Clamp) -> Frame:
-    """The frame with the depth to simulate: the traced length, else the manifest's; failed where neither is known.
-
-    The length of a trace that is not trusted is taken only where no depth is stated: pulling the wire back to it and
-    pushing it on again would change the frames that follow, where there is friction.
-    """
-    depth = frame.expected_mm
-    told = frame.trusted_curve is not None or np.isnan(depth)
-    if source == "traced" and frame.curve is not None and frame.traced and told:
-        depth = depth_from(clamp, frame.curve)
-    if depth <= 0.0:
-        note = f"the traced wire ends {-depth:.2f} mm behind the entry, where nothing can be pushed to; "
-        note += "check that entry_direction points the way the wire is pushed, and that entry_mm lies before its tip"
-        return replace(frame, depth_mm=float("nan")).failed("simulate", FrameStatus.SIMULATE_FAILED, note)
-    found = replace(frame, depth_mm=depth)
-    if not np.isnan(depth):
-        return found
-    return found.failed("simulate", FrameStatus.SIMULATE_FAILED, "no depth: nothing traced and no insertion_mm given")

@@ -1,0 +1,61 @@
+"""The way of the hand as a case knows it: how deep every frame is simulated, and which are only gone through."""
+
+from collections.abc import Collection, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from pipeline.model import Clamp
+from pipeline.run.stages.known import Context, Frame
+from pipeline.simulate.clamp import depth_from
+from pipeline.simulate.way import Stop, Way
+from pipeline.status import FrameStatus
+
+
+def stop_of(frame: Frame) -> Stop:
+    """What the hand had done by a frame whose depth is known."""
+    return Stop(frame.index, frame.depth_mm, frame.roll_deg, frame.catheter_mm)
+
+
+def passed(frames: Sequence[Frame], read: Collection[int]) -> list[Stop]:
+    """The frames that are gone through between those that are ``read``, by number: all whose depth is known.
+
+    The others' way is not known; the insertion goes on from the frame before.
+    """
+    return [stop_of(frame) for frame in frames if frame.index not in read and not np.isnan(frame.depth_mm)]
+
+
+def passed_at(frames: Sequence[Frame], read: Collection[int], source: str, clamp: Clamp) -> list[Stop]:
+    """The same before the depths of a case are settled, or with those of another ``clamp`` or ``source``."""
+    return passed([with_depth(frame, source, clamp) for frame in frames if frame.index not in read], read)
+
+
+def way_of(run: Context, frames: Sequence[Frame], read: Sequence[Frame]) -> Way:
+    """The way to frames that are ``read`` through all ``frames`` of a case whose depths are settled."""
+    through = passed(frames, {frame.index for frame in read})
+    return Way.reading(map(stop_of, read), through, sheathed=run.case.catheter is not None)
+
+
+def by_trace(frame: Frame, source: str) -> bool:
+    """Whether the depth of a frame is its traced length.
+
+    The length of a trace that is not trusted is taken only where no depth is stated: pulling the wire back to it and
+    pushing it on again would change the frames that follow, where there is friction.
+    """
+    told = frame.trusted_curve is not None or np.isnan(frame.expected_mm)
+    return source == "traced" and frame.traced and bool(told)
+
+
+def with_depth(frame: Frame, source: str, clamp: Clamp) -> Frame:
+    """The frame with the depth to simulate: the traced length, else the manifest's; failed where neither is known."""
+    depth = frame.expected_mm
+    if frame.curve is not None and by_trace(frame, source):
+        depth = depth_from(clamp, frame.curve)
+    if depth <= 0.0:
+        note = f"the traced wire ends {-depth:.2f} mm behind the entry, where nothing can be pushed to; "
+        note += "check that entry_direction points the way the wire is pushed, and that entry_mm lies before its tip"
+        return replace(frame, depth_mm=float("nan")).failed("simulate", FrameStatus.SIMULATE_FAILED, note)
+    found = replace(frame, depth_mm=depth)
+    if not np.isnan(depth):
+        return found
+    return found.failed("simulate", FrameStatus.SIMULATE_FAILED, "no depth: nothing traced and no insertion_mm given")
