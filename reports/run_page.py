@@ -135,7 +135,9 @@ def readable_cases(out_dir: Path) -> tuple[list[CaseFiles], list[dict[str, Any]]
 def _worse_cases(summary: pd.DataFrame, links: Mapping[str, str]) -> dict[str, Any]:
     """The table of the cases, and which of them are worse than a guess, whatever a number over all of them says."""
     rows = summary.to_dict("records")
-    return {"cases": _content.cases(summary, links, worse_cases(rows)), "worse": worse_sentence(rows)}
+    table = _content.cases(summary, links, worse_cases(rows))
+    scored = bool(summary["rms_mm"].notna().any())
+    return {"cases": table, "scored": scored, "worse": worse_sentence(rows)}
 
 
 def _not_counted(out_dir: Path) -> dict[str, str]:
