@@ -151,6 +151,7 @@ liver: setup
 setup: $(VENV)/.ready
 
 $(VENV)/.ready: pyproject.toml requirements.lock
+	@test ! -L $(VENV) || { echo "$(VENV) is a link: setup would install into what it points at; remove the link"; exit 1; }
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "wireval needs Python 3.11 or newer")'
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile --require-hashes -r requirements.lock

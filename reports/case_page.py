@@ -7,7 +7,7 @@ from typing import Any
 from reports import _content
 from reports._content import flatten, settings
 from reports.alike import alike
-from reports.case_files import GOOD, CaseFiles, counted, read_case
+from reports.case_files import GOOD, CaseFiles, counted, read_case, runs_in
 from reports.counts import scans
 from reports.doubts import copied_from_traces
 from reports.figures import declared
@@ -110,7 +110,9 @@ def _case_verdict(case: CaseFiles, copied: str) -> str:
     scored = _scored(case)
     how = verdict(scored, case.simulator, Doubt(copied)) if scored or not case.statistics else OF_CALIBRATION
     judged = bool(how) and not copied and _content.number(scored.get("skill_strongest")) != _content.NOTHING
-    alone = "The predictor 'another insertion' may be stronger; it is judged over the run, on its first page." * judged
+    ids = {name for run in runs_in(case.folder.parents[1]) for name in run.get("planned") or ()}
+    alone = "The predictor 'another insertion' may be stronger; it is judged over the run, on its first page."
+    alone *= judged and len(ids) != 1
     return " ".join(filter(None, (became, how, alone)))
 
 

@@ -32,6 +32,7 @@ from reports.origin import why_not_pooled
 from reports.page import Each, draw_sections, one_by_one, write_page
 from reports.records import read_json
 from reports.schema import FAILURES, OVERALL_FILE, SIMULATORS, SUMMARY, SWEEP
+from reports.sweep import not_run_sentence as not_swept_sentence
 from reports.sweep import silent_points
 from reports.tables import first_row, in_texts, read_if_there
 from reports.verdict import Doubt, badge, first_that_holds, of_these_alone, unscored, verdict
@@ -42,30 +43,30 @@ from reports.worse import worse_cases, worse_sentence
 def render_index(out_dir: Path, embed: bool = False, each: Each = one_by_one) -> Path:
     """Draw the figures of the run and write index.html; returns its path. Arguments as for ``render_case``."""
     cases, failures = readable_cases(out_dir)
-    damaged = {row["case"] for row in failures}
-    files = run_files(out_dir, cases)
-    summary, errors, whole = files.summary, files.errors, read_if_there(out_dir / OVERALL_FILE, SUMMARY)
-    pages = {case.name: case.folder / "report.html" for case in cases}
-    links = {name: f"cases/{quote(p.parent.name)}/{p.name}" for name, p in pages.items() if p.exists()}
+    damaged, files = {row["case"] for row in failures}, run_files(out_dir, cases)
+    summary, whole = files.summary, read_if_there(out_dir / OVERALL_FILE, SUMMARY)
+    drawn = [case for case in cases if (case.folder / "report.html").exists()]
+    links = {case.name: f"cases/{quote(case.folder.name)}/report.html" for case in drawn}
     failures += _run_failures(out_dir, cases, links)
     runs = {path.name: read_json(path) for path in sorted(out_dir.glob("run*.json"))}
     infos, row = list(runs.values()), first_row(whole)
     uncounted = damaged | set(summary["case"][summary["role"] == "calibration"])
-    missing, doubts, gates = not_run(out_dir), doubted(out_dir), gates_in(out_dir)
+    missing, doubts, gates, aside = not_run(out_dir), doubted(out_dir), gates_in(out_dir), _not_counted(out_dir)
     mixed, cases_said = why_not_pooled(out_dir), zip(summary["role"], summary["status"], strict=True)
     why_none = mixed or unscored(cases_said) or not_reached(out_dir)
     failed = not (cases and all(map(_of_another, failures)))
     why = {"failures": failed, "cases missing": missing, "not pooled": mixed, "gate closed": gates["closed"]}
+    why["sweep incomplete"] = aside["not_swept"]
     page = {
         **_headline(cases, missing, damaged),
         **_judged(cases, doubts, first_that_holds(why), row, why_none),
         **_worse_cases(summary, links),
-        "worst": worst_frames({n: t for n, t in errors.items() if n not in uncounted}, links),
+        "worst": worst_frames({n: t for n, t in files.errors.items() if n not in uncounted}, links),
         # of several shards' commands none is the one of the run
         "next": next_command([*(f["case"] for f in failures), *missing], typed(out_dir) if len(infos) == 1 else ()),
         "failures": alike(failures),
         "beside_others": (out_dir / SIMULATORS.file).exists(),
-        **_not_counted(out_dir),
+        **aside,
         "gates": gates,
         "assumptions": assumed(out_dir),
         "warnings": [*doubts, *said_by_cases({case.name: case.result for case in cases}, "warnings")],
@@ -134,12 +135,15 @@ def readable_cases(out_dir: Path) -> tuple[list[CaseFiles], list[dict[str, Any]]
 def _worse_cases(summary: pd.DataFrame, links: Mapping[str, str]) -> dict[str, Any]:
     """The table of the cases, and which of them are worse than a guess, whatever a number over all of them says."""
     rows = summary.to_dict("records")
-    return {"cases": _content.cases(summary, links, worse_cases(rows)), "worse": worse_sentence(rows)}
+    table = _content.cases(summary, links, worse_cases(rows))
+    scored = bool(summary["rms_mm"].notna().any())
+    return {"cases": table, "scored": scored, "worse": worse_sentence(rows)}
 
 
 def _not_counted(out_dir: Path) -> dict[str, str]:
-    """Cases that no number of the page is over."""
+    """Cases that no number of the page is over, and results that its sweep lacks."""
     said = {"left_over": left_over_sentence, "not_run": not_run_sentence, "left_out": left_out_sentence}
+    said["not_swept"] = not_swept_sentence
     return {name: sentence(out_dir) for name, sentence in said.items()}
 
 

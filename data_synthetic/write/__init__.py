@@ -3,6 +3,7 @@
 from data_synthetic.write.study_files import (
     alone,
     earlier_files,
+    edited,
     in_the_way,
     write_all_of_them,
     write_one_of,
@@ -10,4 +11,13 @@ from data_synthetic.write.study_files import (
 )
 from data_synthetic.write.volumes import FORMATS
 
-__all__ = ["FORMATS", "alone", "earlier_files", "in_the_way", "write_all_of_them", "write_one_of", "write_study"]
+__all__ = [
+    "FORMATS",
+    "alone",
+    "earlier_files",
+    "edited",
+    "in_the_way",
+    "write_all_of_them",
+    "write_one_of",
+    "write_study",
+]

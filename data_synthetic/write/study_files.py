@@ -1,6 +1,7 @@
 """The files of a study: its volumes, what is known of it as truth.json, and the manifest by which it is run."""
 
 import contextlib
+import hashlib
 import json
 import math
 import tomllib
@@ -13,6 +14,7 @@ from data_synthetic.write.volumes import FORMATS, HDF5_FILE, manifest_names, vol
 
 MANIFEST, TRUTH = "manifest.toml", "truth.json"
 ALL_OF_THEM = "insertions into one phantom"
+SEAL = "# written by synth, SHA-256 of the lines above: "
 
 
 def earlier_files(folder: Path) -> list[Path]:
@@ -33,6 +35,18 @@ def earlier_files(folder: Path) -> list[Path]:
     # a DICOM series is a folder of slices: those that are numbered as we number them
     slices = [p for path in paths for p in ([path] if path.is_file() else sorted(path.glob("[0-9]" * 4 + ".dcm")))]
     return [*slices, folder / TRUTH, folder / MANIFEST]
+
+
+def edited(folder: Path) -> list[str]:
+    """A sentence where the manifest in a folder is not as we wrote it: a study would overwrite what was changed."""
+    text = _text(folder / MANIFEST)
+    what = "was changed since synth wrote it, or an earlier version wrote it; --fresh overwrites it"
+    return [f"{folder / MANIFEST}: {what}"] * (bool(text) and text != _sealed(text.rpartition(SEAL)[0]))
+
+
+def _sealed(text: str) -> str:
+    """A manifest with its hash in the last line."""
+    return f"{text}{SEAL}{hashlib.sha256(text.encode()).hexdigest()}\n"
 
 
 def _text(path: Path) -> str:
@@ -88,7 +102,7 @@ def write_study(study: Study, folder: str | Path, format: str = "mha", progress:
             progress(i, frames)
     (folder / TRUTH).write_text(json.dumps(truth_record(study)), encoding="utf-8")
     manifest = folder / MANIFEST
-    manifest.write_text(manifest_text(study, format), encoding="utf-8")
+    manifest.write_text(_sealed(manifest_text(study, format)), encoding="utf-8")
     return manifest
 
 
@@ -101,7 +115,7 @@ def write_one_of(study: Study, folder: Path, number: int, format: str = "mha") -
 def write_all_of_them(texts: Sequence[str], folder: Path) -> Path:
     """Write the manifest of all insertions into one phantom. texts : of ``write_one_of``, in order."""
     manifest = folder / MANIFEST
-    manifest.write_text("\n".join([f"# {ALL_OF_THEM}: {len(texts)}", *texts]), encoding="utf-8")
+    manifest.write_text(_sealed("\n".join([f"# {ALL_OF_THEM}: {len(texts)}", *texts])), encoding="utf-8")
     return manifest
 
 

@@ -1,7 +1,6 @@
 """``wireval diff OUT_A OUT_B``: what differs, the verdict with paired intervals, frame by frame: the gate for CI."""
 
 import argparse
-import sys
 from pathlib import Path
 
 from pipeline.commands import add_quiet, say, unwritable
@@ -33,7 +32,6 @@ def main(args: argparse.Namespace) -> int:
     """
     from pipeline.run.compared import compared
     from pipeline.status import UsageError
-    from reports.case_files import find_cases
     from reports.two_runs_files import write
 
     places = {name: getattr(args, name) for name in FILES}
@@ -45,8 +43,6 @@ def main(args: argparse.Namespace) -> int:
     except (ValueError, OSError) as error:
         raise UsageError([str(error)]) from None
     write(verdict, **places)
-    if not find_cases(args.second):
-        sys.stderr.write(f"{args.second}: no case below it: is this what `wireval run` wrote?\n")
     for line in [verdict.sentence] if args.quiet else verdict.lines():
         say(line)
     return 1 if verdict.closed else 0

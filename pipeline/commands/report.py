@@ -43,6 +43,7 @@ def main(args: argparse.Namespace) -> int:
     from reports.records import damaged_records
     from reports.run_page import render_index
     from reports.simulators import folders_in
+    from reports.sweep import not_run, not_run_sentence
 
     found = found_results(args.out)
     if not found:
@@ -54,9 +55,8 @@ def main(args: argparse.Namespace) -> int:
     if removed := write_sweep(args.out, heads):
         sys.stderr.write(f"{removed}\n")
     lost = lost_points(args.out, heads)
-    for line in lost_lines(lost):
-        sys.stderr.write(f"{line}\n")
-    totals = replace(aggregate(args.out), sweep_lost=len(lost))
+    sys.stderr.writelines(f"{line}\n" for line in filter(None, [*lost_lines(lost), not_run_sentence(args.out)]))
+    totals = replace(aggregate(args.out), sweep_lost=len(lost), sweep_missing=len(not_run(args.out)[0]))
     drawn = args.overview or _all_drawn(args, found)
     page = render_index(args.out, embed=args.embed)
     others_ok = _others(args.out, embed=args.embed)

@@ -46,6 +46,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     add(
         "--scanner", default="psf", choices=("psf", "conebeam"), help="ideal, or 3D rotational X-ray (extra [conebeam])"
     )
+    add("--fresh", action="store_true", help="overwrite a study whose manifest was changed since it was written")
     add_quiet(parser)
 
 
@@ -139,7 +140,7 @@ def main(args: Namespace) -> int:
 def _one(args: Namespace) -> int:
     """One study; as ``main``."""
     from data_synthetic import catalogue
-    from data_synthetic.write import earlier_files, in_the_way, write_study
+    from data_synthetic.write import earlier_files, edited, in_the_way, write_study
 
     clock = perf_counter()
     chat = (lambda _: None) if args.quiet else say
@@ -148,6 +149,7 @@ def _one(args: Namespace) -> int:
         scene = _scene(args)
         problems = catalogue.Wanted(**numbers).problems(scene, args.scanner)
         problems = problems or in_the_way(args.out, args.format, args.frames or scene.frames)
+        problems = problems or edited(args.out) * (not args.fresh)
         if problems:
             return complain(problems, "the command line")
         if args.background is not None:
@@ -172,14 +174,16 @@ def _one(args: Namespace) -> int:
 
 def _several(args: Namespace) -> int:
     """Several insertions into one phantom, shared out among processes; as ``main``."""
-    from data_synthetic.write import alone, in_the_way, write_all_of_them
+    from data_synthetic.write import alone, edited, in_the_way, write_all_of_them
     from pipeline.run.helpers import shared
 
     clock = perf_counter()
     try:
         scene = _scene(args)
         frames = args.frames or scene.frames
-        problems = _wanted(args).problems(scene, args.scanner) + alone(args.out)
+        problems = _wanted(args).problems(scene, args.scanner) + (
+            alone(args.out) or edited(args.out) * (not args.fresh)
+        )
         folders = [] if problems else [args.out / str(n + 1) for n in range(args.insertions)]
         problems += [problem for folder in folders for problem in in_the_way(folder, args.format, frames)]
     except ValueError as error:

@@ -36,7 +36,8 @@ class Totals:
     unscored : why there are no errors.     mixed : whether the reason is that settings or manifests differ.
     gates : by each condition that was asked, why the run must not pass, empty where it may.     opened : a sentence for
     each of those.
-    sweep_lost : cases that crashed at a point of a sweep; they are not counted in ``cases``.
+    sweep_lost, sweep_missing : cases that crashed at a point of a sweep, or were not run there; they are not counted in
+    ``cases``.
     frames_fitted : scans that a roll was fitted on; they are not counted in ``frames``.
     """
 
@@ -53,12 +54,15 @@ class Totals:
     gates: Mapping[str, str] = field(default_factory=dict)
     opened: Sequence[str] = ()
     sweep_lost: int = 0
+    sweep_missing: int = 0
     frames_fitted: int = 0
 
     @property
     def all_ok(self) -> bool:
         """Whether every case is ok: decides the exit code and the printed counts alike."""
-        return self.cases > 0 and self.cases_ok == self.cases and not (self.mixed or self.sweep_lost)
+        return (
+            self.cases > 0 and self.cases_ok == self.cases and not (self.mixed or self.sweep_lost or self.sweep_missing)
+        )
 
     @property
     def closed(self) -> list[str]:

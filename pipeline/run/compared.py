@@ -34,6 +34,8 @@ def compared(first: Path, second: Path, tolerance: Path | None = None) -> Verdic
     for out in runs:
         if not is_folder(out):
             raise ValueError(f"{out}: no such folder; give one that `wireval run` wrote")
+    if not find_cases(second) and not any(second.glob("run*.json")):
+        raise ValueError(f"{second}: no case below it: is this what `wireval run` wrote?")
     allowed = load_tolerance(tolerance or DEFAULT_TOLERANCE)
     old, new = map(folders_in, runs)
     if not (old and new):

@@ -37,7 +37,7 @@ def failure_lines(plan: Plan, then: str = "") -> list[str]:
         cases += [row["case"] for row in result.failures]
         lines += map(_failure, alike(result.failures))
     heads = heads_of(plan.template.settings, plan.cases, plan.points)
-    lines += lost_lines(lost_points(plan.out, heads, plan.ids))
+    lines += lost_lines(lost_points(plan.out, heads))
     lines += silent_points(read_if_there(plan.out / SWEEP.file, SWEEP))
     then = then or _next(plan, cases)
     worse = worse_sentence([{**result.summary, "role": result.role} for result in found])
@@ -78,6 +78,8 @@ def last_line(totals: Totals, index: Path) -> str:
         parts.append(f"{totals.cases - totals.cases_ok} of the cases not ok (failures.csv)")
     if totals.sweep_lost:
         parts.append(f"{counted(totals.sweep_lost, 'result')} of the sweep lost")
+    if totals.sweep_missing:
+        parts.append(f"{counted(totals.sweep_missing, 'result')} of the sweep not run")
     if np.isfinite(totals.median_mm):
         parts.append(f"median point error {totals.median_mm:.3f} mm (p95 {totals.p95_mm:.3f})")
         low, high, said = (totals.pooled[name] for name in ("rms_low_mm", "rms_high_mm", "interval"))

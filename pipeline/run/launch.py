@@ -178,7 +178,7 @@ def launch(plan: Plan) -> tuple[Totals, Path]:
         sys.stderr.write(f"{removed}\n")
     info |= {"provenance": code_state(), "assumptions": plan.assumptions}
     Store(plan.template.cache).trim()
-    totals = replace(aggregate(out, info, name), sweep_lost=len(lost_points(out, heads, plan.ids)))
+    totals = replace(aggregate(out, info, name), sweep_lost=len(lost_points(out, heads)))
     return totals, render_index(out, plan.template.embed, each_on(1 if plan.address else plan.workers))
 
 

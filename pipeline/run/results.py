@@ -33,7 +33,6 @@ LOST = {
     "crashed": "the case ended in an unexpected error; its log has the traceback",
     "worker_lost": "the worker process was killed, twice; its log tells where it was",
     "scheduler_lost": "the dask scheduler went away while the case ran or waited; give the same command again",
-    "missing": "the case has a plain result and none here; give the command with --sweep again",
     "outdated": "the result is of other files, or of another manifest, than the plain one; give the command with "
     "--sweep again",
     "over_limit": "the case took more time or memory than it may; raise --case-timeout or --case-memory",

@@ -4,7 +4,7 @@ Segmentation and tracing do not depend on the solver's settings, so the stage st
 simulation and comparison only. An agreement that no parameter moves is suspicious.
 """
 
-from collections.abc import Container, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from operator import attrgetter
 from pathlib import Path
@@ -21,7 +21,7 @@ from reports.case_files import listed
 from reports.origin import why_not_pooled
 from reports.records import read_json
 from reports.schema import SWEEP
-from reports.sweep import UNCHANGED
+from reports.sweep import UNCHANGED, folder_of
 
 AGAIN = "give the command with --sweep again"
 
@@ -44,15 +44,11 @@ class SweepPoint:
     @property
     def folder(self) -> Path:
         """Its sub-folder of the output."""
-        return _folder({"parameter": self.parameter, "value": self.value})
+        return folder_of({"parameter": self.parameter, "value": self.value})
 
 
 Head = dict[str, str]
 """A point as run.json and sweep.csv name it: the setting, its value here and in the plain run (unchanged)."""
-
-
-def _folder(head: Head) -> Path:
-    return Path("sweep", f"{head['parameter']}={head['value']}".replace("/", "_"))
 
 
 def points_of(texts: Sequence[str], base: Sequence[Setting]) -> list[SweepPoint]:
@@ -91,45 +87,27 @@ def found_heads(out: Path) -> list[Head]:
     return list(found.values())
 
 
-def asked_of(out: Path) -> dict[Path, set[str]]:
-    """By the folder of each point, the cases for which the runs into an output folder were to compute it."""
-    found: dict[Path, set[str]] = {}
-    for run in map(read_json, out.glob("run*.json")):
-        for head in run.get("sweep", ()):
-            found.setdefault(_folder(head), set()).update(run.get("swept", ()))
-    return found
-
-
 def _at(out: Path, head: Head, plain: Sequence[Found]) -> list[Found]:
     """Those cases at a sweep point that the plain run has, too, of the same inputs."""
     known = {case.result.case: case.result for case in plain}
-    found = [case for case in found_cases(out / _folder(head)) if case.result.case in known]
+    found = [case for case in found_cases(out / folder_of(head)) if case.result.case in known]
     return [case for case in found if case.result.same_inputs(known[case.result.case])]
 
 
-def lost_points(out: Path, heads: Sequence[Head], cases: Container[str] | None = None) -> list[tuple[Path, Result]]:
-    """Results that a sweep has lost (crashed, killed, damaged, missing, of other inputs), each with its point's folder.
-
-    cases : those that are asked for at each point; None: those that the runs into the folder were to compute.
-    """
+def lost_points(out: Path, heads: Sequence[Head]) -> list[tuple[Path, Result]]:
+    """Results that a sweep has lost (crashed, killed, damaged, of other inputs), each with its point's folder."""
     if not heads:
         return []
-    folders = [_folder(head) for head in heads]
-    plain, asked = found_results(out), asked_of(out) if cases is None else dict.fromkeys(folders, cases)
-    lost_ones: list[tuple[Path, Result]] = []
-    for folder in folders:
+    plain, lost_ones = found_results(out), list[tuple[Path, Result]]()
+    for folder in map(folder_of, heads):
         there = {result.case: result for result in found_results(out / folder)}
-        wanted = asked.get(folder, ())
-        lost_ones += [(folder, one) for case in plain if (one := _amiss(out / folder, case, there, wanted))]
+        both = [(case, there[case.case]) for case in plain if case.case in there]
+        lost_ones += [(folder, one) for case, found in both if (one := _amiss(out / folder, case, found))]
     return lost_ones
 
 
-def _amiss(place: Path, plain: Result, there: Mapping[str, Result], asked: Container[str]) -> Result | None:
-    """What is to be said of a case at a point; None where it has its result, or none was asked for."""
-    found = there.get(plain.case)
-    if found is None:
-        why = f"{place}: no result of this case; {AGAIN}"
-        return lost(plain.case, "missing", why) if plain.case in asked else None
+def _amiss(place: Path, plain: Result, found: Result) -> Result | None:
+    """What is to be said of a case's result at a point; None where it is one of the same inputs."""
     if found.status in LOST:
         return found
     why = f"{place}: the case's files, or what the manifest states of it, are not those of the plain result; {AGAIN}"
@@ -155,7 +133,7 @@ def write_sweep(out: Path, heads: Sequence[Head], *, earlier: bool = False) -> s
     for head in heads:
         rows += _rows(head, before, _at(out, head, before), null)
     tables.write(out / SWEEP.file, SWEEP, rows)
-    others = listed(sorted({path.name for path in out.glob("sweep/*")} - {_folder(head).name for head in heads}))
+    others = listed(sorted({path.name for path in out.glob("sweep/*")} - {folder_of(head).name for head in heads}))
     return f"{out / SWEEP.file}: without points of an earlier run, which are kept: {others}; {AGAIN}" * bool(others)
 
 
@@ -170,10 +148,13 @@ def unchanged(plain: Resolved, cases: Sequence[Case], parameter: str) -> str:
 
 
 def _rows(head: Head, before: Sequence[Found], after: Sequence[Found], null: str) -> Iterator[dict[str, Any]]:
-    """A row for each case of ``after``, and one over all where there are several."""
+    """A row for each case of ``after``, and one over all where there are several, and every case of ``before``.
+
+    Over two of six cases it stood beside a plain row over all of them, as if the setting had made the difference.
+    """
     for case in after:
         yield _row(head, case.result.summary, before, [case], null)
-    if len(after) > 1 and (whole := overall(after)):
+    if 1 < len(after) == len(before) and (whole := overall(after)):
         yield _row(head, whole, before, after, null)
 
 

@@ -253,7 +253,7 @@ def _told(given: Clamp, found: Clamp, out: Sequence[int], used: int, contradicti
     if shift > FARTHEST_MM or turned > LARGEST_TURN_DEG:
         warning = (
             f"the simulated wire fits the first {REACH_MM:g} mm of the traces from a clamp {offset} (accepted: "
-            f"{FARTHEST_MM} mm and {LARGEST_TURN_DEG} degrees); the manifest's entry was kept: check entry_mm and "
+            f"{FARTHEST_MM} mm and {LARGEST_TURN_DEG} degrees): the manifest's entry was kept. Check entry_mm and "
             "entry_direction, and where these are right roll, material_axis and the wire's tip and stiffness; the "
             f"clamp is entry_mm = {found.entry_mm.round(2).tolist()}, "
             f"entry_direction = {found.direction.round(4).tolist()}"

@@ -17,7 +17,7 @@ def error_along_wire(case: CaseFiles) -> Drawing | None:
     """Distance to the traced curve along the simulated wire, of frames that are ok."""
     failed = set(case.errors["frame"]) - set(case.good["frame"])
     points = case.points[~case.points["frame"].isin(failed)]
-    return _along_wire(points, "error_mm", "to the traced curve, mm", error_scale())
+    return _along_wire(points, "error_mm", "distance to the traced curve, mm", error_scale())
 
 
 def error_over_u(case: CaseFiles) -> Drawing | None:

@@ -52,7 +52,7 @@ def with_unchanged(sweep: pd.DataFrame) -> pd.DataFrame:
 
 def _panel(axes: Axes, rows: pd.DataFrame) -> None:
     rows = rows.assign(place=_value_axis(axes, rows["value"])).sort_values("place")
-    pooled = rows["case"] == (ALL if (rows["case"] == ALL).any() else rows["case"].iloc[0])
+    pooled = rows["case"] == (ALL if len(set(rows["case"])) > 1 else rows["case"].iloc[0])
     for _, one in rows[~pooled].groupby("case"):
         axes.plot(one["place"], one["rms_mm"], color=GREY, linewidth=0.6, alpha=0.7)
     whole = rows[pooled]

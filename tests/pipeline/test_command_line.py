@@ -656,13 +656,16 @@ def test_what_keeps_nothing_does_not_say_that_it_goes_on(
 def test_diff_says_where_the_candidate_is_no_run(
     study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A folder of scans was told as a run that has lost all cases."""
+    """A folder of scans was told as a run that has lost all cases, exit code 1; a run that lost all is one."""
     out = tmp_path / "out"
     assert main(["run", str(study), "-o", str(out), "--until", "compare"]) == 0
-    for second, said in ((study, True), (out, False)):
+    empty = tmp_path / "empty"
+    empty.mkdir()
+    shutil.copy(out / "run.json", empty)
+    for second, code in ((study, 2), (out, 0), (empty, 1)):
         capsys.readouterr()
-        assert main(["diff", str(out), str(second)]) == said
-        assert ("no case below it: is this what `wireval run` wrote?" in capsys.readouterr().err) == said
+        assert main(["diff", str(out), str(second)]) == code
+        assert ("no case below it: is this what `wireval run` wrote?" in capsys.readouterr().err) == (code == 2)
 
 
 def test_an_output_that_cannot_be_written_is_no_success() -> None:

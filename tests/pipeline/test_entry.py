@@ -129,7 +129,7 @@ def test_an_entry_far_off_is_not_followed_but_said() -> None:
     curves = [trace(20.0, 0.01, np.random.default_rng(i)) for i in range(3)]
     found = estimate(curves, off(0.0, (3.0, 0.0, 0.0)))
     np.testing.assert_array_equal(found.entry_mm, [3.0, 0.0, 0.0])
-    assert "check entry_mm" in found.warning
+    assert "Check entry_mm" in found.warning
     lines = found.warning.rpartition("the clamp is ")[2].replace(", entry_direction", "\nentry_direction")
     said = tomllib.loads(lines)
     assert np.linalg.norm(said["entry_mm"]) < 1.0, "what may be copied is where the traces begin"

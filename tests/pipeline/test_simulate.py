@@ -15,6 +15,7 @@ from pipeline.run.stages.covered import too_thick
 from pipeline.run.stages.known import Frame
 from pipeline.run.stages.load import each_frame
 from pipeline.run.stages.simulate import _pressed_deep, judged
+from pipeline.run.stages.turned_back import turned_back
 from pipeline.simulate import altered, guide_wire, insertion_of, resolution
 from pipeline.simulate.config import SimulateConfig, SolverConfig
 from pipeline.study.manifest import Case, ManifestError, read_manifest
@@ -236,3 +237,19 @@ def test_nothing_to_simulate_is_no_error() -> None:
     """No frame was traced and no depth is stated: the case crashed, and what its frames said was lost."""
     nothing = resolution.resolve(lambda segment_mm, refined: [], [1.0, 0.5])
     assert len(nothing.wires) == len(nothing.num_mm) == 0
+
+
+def test_a_wire_that_runs_back_in_the_vessel_is_told_and_a_curled_tip_is_not() -> None:
+    """In a real carotid artery one lay doubled back over 26 mm, ok, without a word."""
+    axes = np.meshgrid(*[np.arange(-4.0, 4.5, 0.5)] * 2, np.arange(0.0, 60.5, 0.5), indexing="ij")
+    tube = Grid(np.hypot(axes[0], axes[1]) - 3.0, np.full(3, 0.5), np.array([-4.0, -4.0, 0.0]), np.eye(3))
+    out, turn = np.linspace(0.0, 40.0, 81), np.linspace(0.0, np.pi, 20)
+    bend = np.stack([-2.0 * np.cos(turn), 0.0 * turn, 40.0 + 2.0 * np.sin(turn)], axis=1)
+    pushed = np.stack([0.0 * out - 2.0, 0.0 * out, out], axis=1)
+    back = np.stack([0.0 * out + 2.0, 0.0 * out, out[::-1]], axis=1)
+    curls = np.concatenate([pushed, *[np.concatenate([bend, bend[::-1] * [1, 1, -1] + [0, 0, 80]])] * 3])
+    wires = {0: pushed, 1: np.concatenate([pushed, bend, back[:60]]), 2: curls, 3: np.concatenate([pushed, bend])}
+    (said,) = turned_back(tube, np.zeros(3), wires)
+    assert said.startswith("1 frame (1): the simulated wire has turned round")
+    assert "in frame 1 from 42 mm along it by 31 mm" in said
+    assert turned_back(tube, np.zeros(3), {}) == []

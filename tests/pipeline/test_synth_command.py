@@ -111,6 +111,23 @@ def test_a_study_written_over_an_earlier_one_says_so(tmp_path: Path, capsys: pyt
     assert "mine.mha: would be read as a part of the study" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("more", [[], ["--insertions", "2"]], ids=["one", "several"])
+def test_a_manifest_that_was_changed_is_not_overwritten(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], more: list[str]
+) -> None:
+    """The how-to on calibration has a study's roles changed; with -q they were gone without a word."""
+    words = ["synth", "short-wire", "-o", str(tmp_path), "--size", "54", "--frames", "1", "-q", *more]
+    manifest = tmp_path / "manifest.toml"
+    assert [main(words), main(words)] == [0, 0]
+    written = manifest.read_text(encoding="utf-8")
+    manifest.write_text(written.replace('"validation"', '"calibration"'), encoding="utf-8")
+    assert main(words) == 2
+    assert f"{manifest}: was changed since synth wrote it" in capsys.readouterr().err
+    assert "calibration" in manifest.read_text(encoding="utf-8")
+    assert main([*words, "--fresh"]) == 0
+    assert manifest.read_text(encoding="utf-8") == written
+
+
 def test_no_folder(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["synth", "bend"]) == 2
     assert "-o DIR is missing" in capsys.readouterr().err

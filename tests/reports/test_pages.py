@@ -386,6 +386,10 @@ def test_a_case_page_says_who_is_judged_over_the_run_alone(tmp_path: Path, skill
     result["summary"] |= {"skill_strongest": skill, "strongest_null": "previous" if skill else None}
     (folder / "result.json").write_text(json.dumps(result), encoding="utf-8")
     assert ("it is judged over the run" in render_case(folder).read_text(encoding="utf-8")) == said
+    run = json.loads((tmp_path / "out" / "run.json").read_text(encoding="utf-8"))
+    (tmp_path / "out" / "run.json").write_text(json.dumps(run | {"planned": ["a"]}), encoding="utf-8")
+    page = render_case(folder).read_text(encoding="utf-8")
+    assert "it is judged over the run" not in page, "there is no other insertion"
 
 
 @pytest.mark.usefixtures("scarce")

@@ -71,7 +71,7 @@ def budgeted(run: Context, known: Known) -> Known:
             run.log.warnings.append(f"case {run.case.id!r} has no budget: {error}; lower that input's uncertainty")
             return known
     run.log.assumptions.append(work.said())
-    run.log.warnings += _lost(found, settings.members) + _rare(rank, settings.members)
+    run.log.warnings += _lost(found, settings.members) + _rare(rank)
     run.log.warnings += [FEW_ALONE.format(settings.members_alone)] * (0 < settings.members_alone < FEWEST)
     done = tuple(replace(frame, budget=found.get(frame.index)) for frame in known.frames)
     return replace(known, frames=done, sources=tuple(rows), ends_rank=rank)
@@ -90,13 +90,13 @@ def _lost(found: Mapping[int, Budget | None], count: int) -> list[str]:
     ]
 
 
-def _rare(rank: float, count: int) -> list[str]:
+def _rare(rank: float) -> list[str]:
     """A warning where hardly any member of the ensemble lies as far off as the real insertion."""
     if not rank <= RARE:
         return []
     return [
-        f"the traced wires' last {DISTAL_MM:g} mm, of all frames together, lie as far from the simulated ones as in "
-        f"{100 * rank:.2g} % of the {count} insertions of the budget (ends_rank): the model is wrong, or an input is "
+        f"the traced wires' last {DISTAL_MM:g} mm, of all frames together, lie as far from the simulated ones as "
+        f"1 in {1.0 / rank:.0f} of the budget's insertions (ends_rank): the model is wrong, or an input is "
         "less certain than stated; of right ones one case in twenty has this, too"
     ]
 

@@ -15,6 +15,7 @@ from pipeline.run.stages.in_itself import not_in_itself
 from pipeline.run.stages.known import Context, Frame, Known
 from pipeline.run.stages.others import frames_of_others
 from pipeline.run.stages.roll import with_fitted_roll
+from pipeline.run.stages.turned_back import turned_back
 from pipeline.run.stages.way import way_of, with_depth
 from pipeline.simulate import LEVELS, altered, insertion_of, simulate, wall_of
 from pipeline.simulate.resolution import LARGEST_JOINT_TURN_DEG, Resolved, lengths_mm, resolve
@@ -65,6 +66,9 @@ def _replayed(run: Context, known: Known) -> Known:
     resolved = _resolved(run, known, replay)
     log.assumptions.append(f"segments of {resolved.segment_mm:g} mm: {resolved.reason}")
     log.chosen["segment_mm"] = f"{resolved.segment_mm:g}: {resolved.reason}"
+    both = zip(replay, resolved.wires, strict=True)
+    untraced = {frame.index: wire.joints_mm for frame, wire in both if frame.curve is None and wire.converged}
+    log.warnings += turned_back(known.vessel.distance, known.held.entry_mm, untraced)
     for frame, wire, num_mm in zip(replay, resolved.wires, resolved.num_mm, strict=True):
         log.warnings += [_told(frame.index, snap) for snap in wire.snaps]
         found = replace(frame, simulated=wire, num_mm=float(num_mm))
