@@ -81,6 +81,8 @@ def _refused(data: Any, key: Place, place: Place, schema: Schema) -> tuple[Place
     whole = _value(data, key)
     where = key if len(as_toml(whole)) <= LONGEST else place
     words = expected(_value(data, where), node, schema.get("$defs", {}), optional=not needed)
+    if isinstance(whole, float) and 0.0 < whole < 1e-3 and str(key[-1]).endswith("_mm"):
+        words += f"; is it in metres ({1e3 * whole:g} mm)?"
     return where, words
 
 

@@ -1,11 +1,12 @@
 """Every problem of a study at once, from the manifest and the scans' headers alone."""
 
 from collections.abc import Callable, Container, Iterator, Sequence
-from itertools import product
+from itertools import islice, product
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from pipeline.load import Header, LoadError, Scans, Source, each_volume, read_header, require_one, require_whole
 from pipeline.load.curves import read_curve, read_truth
@@ -14,8 +15,9 @@ from pipeline.load.lumens import read_lumen
 from pipeline.load.masks import mask_header
 from pipeline.load.views import read_views
 from pipeline.load.wires import read_wires
-from pipeline.model import Branches, Shapes
+from pipeline.model import Array, Branches, Shapes
 from pipeline.simulate.others import oddity
+from pipeline.status import nearest
 from pipeline.study.coarse import too_coarse
 from pipeline.study.manifest import Case, not_one_per_frame
 from pipeline.study.parameters import ParametersError, read_parameters
@@ -27,6 +29,8 @@ from pipeline.study.sources import files_of, is_pattern
 T = TypeVar("T")
 NEAR_MM = 20.0
 """An entry further than this from the box of the own lumen was not meant for it."""
+MOST_BESIDE = 2000
+"""Names in a folder among which the one that was meant is looked for."""
 
 
 def check(cases: Sequence[Case], config: Config, *, whole: bool = True) -> list[str]:
@@ -99,7 +103,9 @@ def _absent(case: Case) -> Iterator[tuple[Path, str]]:
     for path in dict.fromkeys(files_of(case).values()):
         try:
             if status_of(path) is None:
-                yield path, f"{path}: {'matches no file' if is_pattern(path.name) else 'no such file or folder'}"
+                what = "matches no file" if is_pattern(path.name) else "no such file or folder"
+                near = nearest(path.name, [beside.name for beside in islice(path.parent.glob("*"), MOST_BESIDE)])
+                yield path, f"{path}: {what}" + f"; did you mean {near!r}?" * bool(near)
         except LoadError as error:
             yield path, str(error)
 
@@ -121,13 +127,25 @@ def _lumen_problems(case: Case, config: Config, absent: Container[Path]) -> Iter
     except LoadError as error:
         yield str(error)
         return
-    away = float(np.linalg.norm(np.maximum(np.maximum(low - case.entry_mm, case.entry_mm - high), 0.0)))
+
+    def away_mm(point: ArrayLike) -> float:
+        return float(np.linalg.norm(np.maximum(np.maximum(low - point, np.asarray(point) - high), 0.0)))
+
+    away = away_mm(case.entry_mm)
     if away > NEAR_MM:
         spans = f"{low.round(1).tolist()} to {high.round(1).tolist()} mm in LPS"
+        fits = _fitting(case.entry_mm, lambda point: away_mm(point) == 0.0)
         yield (
             f"{case.lumen}: entry_mm {list(case.entry_mm)} lies {away:.0f} mm from the lumen, which spans {spans}; "
-            "is one of them in RAS, or in another unit than mm?"
+            f"{fits or 'is one of them in RAS, or in another unit than mm?'}"
         )
+
+
+def _fitting(point_mm: ArrayLike, within: Callable[[Array], bool]) -> str:
+    """What a point that lies outside would be within as; empty where nothing simple helps."""
+    point, turned = np.asarray(point_mm), np.array([-1.0, -1.0, 1.0])
+    ways = {"RAS? With its first two signs changed": point * turned, "metres? Times 1000": 1e3 * point}
+    return next((f"is it in {how}, {p.round(3).tolist()}, it lies there" for how, p in ways.items() if within(p)), "")
 
 
 def _told_problems(case: Case, count: int | None, absent: Container[Path]) -> list[str]:
@@ -168,7 +186,7 @@ def entry_problems(case: Case, scans: Scans) -> list[str]:
     header = scans.first
     if header is None:
         return []
-    problems = []
+    problems, middle = [], 0.5 * (np.array(header.shape) - 1.0)
     seeds = [point for point in case.lumen_seed_mm if point != case.entry_mm]
     for name, points in (("entry_mm", [case.entry_mm]), ("lumen_seed_mm", seeds)):
         if not points:
@@ -176,10 +194,11 @@ def entry_problems(case: Case, scans: Scans) -> list[str]:
         index = header.grid.to_index(points)
         for point, voxel in zip(points, index, strict=True):
             if np.any(voxel < -0.5) or np.any(voxel > np.array(header.shape) - 0.5):
+                fits = _fitting(point, lambda p: bool(np.all(np.abs(header.grid.to_index(p) - middle) <= middle + 0.5)))
                 corners = header.grid.to_mm([[0, 0, 0], [n - 1 for n in header.shape]]).round(1).tolist()
                 problems.append(
                     f"{name} {list(point)} lies outside the scan (voxel {voxel.round(1).tolist()} of "
                     f"{list(header.shape)}); the scan spans {corners[0]} to {corners[1]} mm in LPS; "
-                    "is the point in RAS, or in voxels?"
+                    f"{fits or 'is the point in RAS, or in voxels?'}"
                 )
     return list(dict.fromkeys(problems))

@@ -65,16 +65,23 @@
 
   // What of a wide table lies beyond the edge is said, and a button goes there.
   const hint = (pane, button, table) => {
+    const ends = () => [...table.tHead.rows[0].cells].map((head) => head.getBoundingClientRect().right);
     const look = () => {
-      const edge = pane.getBoundingClientRect().right + 1;
-      const cut = [...table.tHead.rows[0].cells].filter((head) => head.getBoundingClientRect().right > edge).length;
+      const edge = pane.getBoundingClientRect().right + 1, cut = ends().filter((end) => end > edge).length;
       button.hidden = !cut;
       button.textContent = `${cut} more column${cut === 1 ? "" : "s"} \u2192`;
       pane.classList.toggle("cut", cut > 0);
     };
     button.addEventListener("click", () => pane.scrollBy({ left: 0.8 * pane.clientWidth, behavior: "smooth" }));
     pane.addEventListener("scroll", look);
-    new ResizeObserver(look).observe(pane);
+    new ResizeObserver(() => { // it ends between two columns: through one, its numbers lacked digits
+      pane.style.maxWidth = "";
+      pane.classList.add("cut");
+      const left = pane.getBoundingClientRect().left - pane.scrollLeft, whole = ends().map((end) => end - left);
+      const room = Math.max(0, ...whole.filter((end) => end <= pane.clientWidth)), frame = pane.offsetWidth - pane.clientWidth;
+      if (room && table.offsetWidth > pane.clientWidth + 3) pane.style.maxWidth = `${Math.ceil(room) + frame}px`;
+      look();
+    }).observe(pane.parentElement);
   };
 
   for (const box of all("[data-table]")) {

@@ -529,6 +529,30 @@ def test_what_cannot_be_read_hides_nothing_else_of_its_case(
         assert problem in said
 
 
+@pytest.mark.parametrize(
+    ("entry", "told"),
+    [
+        ([-50.0, -60.0, 5.0], "is it in RAS? With its first two signs changed, [50.0, 60.0, 5.0], it lies there"),
+        ([0.05, 0.06, 0.005], "is it in metres? Times 1000, [50.0, 60.0, 5.0], it lies there"),
+        ([500.0, 0.0, 0.0], "is one of them in RAS, or in another unit than mm?"),
+    ],
+)
+def test_what_would_put_an_entry_into_the_lumen_is_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], entry: list[float], told: str
+) -> None:
+    rows = [f"{i + 1} 3 50 60 {i} 2.0 {i if i else -1}" for i in range(61)]
+    (tmp_path / "tube.swc").write_text("\n".join(rows), encoding="utf-8")
+    case = f'id = "a"\nlumen = "tube.swc"\nentry_mm = {entry}\nentry_direction = [0, 0, 1]\nwire = "w"\n'
+    wire = "schema = 1\n[wires.w]\nradius_mm = 0.18\nbending_stiffness_N_mm2 = 5.0\n"
+    text = f"{wire}[[case]]\n{case}insertion_mm = [9]\n[case.wall]\nstiffness_N_mm2 = 2.0\n"
+    (tmp_path / "manifest.toml").write_text(text, encoding="utf-8")
+    assert main(["check", str(tmp_path)]) == 2
+    assert told in capsys.readouterr().err
+    (tmp_path / "manifest.toml").write_text(text.replace("tube.swc", "tubes.swc"), encoding="utf-8")
+    assert main(["check", str(tmp_path)]) == 2
+    assert "tubes.swc: no such file or folder; did you mean 'tube.swc'?" in capsys.readouterr().err
+
+
 def test_bad_cases_are_left_out_and_named_where_that_is_asked_for(
     study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -129,6 +129,13 @@ def test_a_wire_that_is_wrong_is_told_once(tmp_path: Path) -> None:
     assert problem.endswith('wires w radius_mm = "thin": expected a number from 0.001 to 20; correct it')
 
 
+def test_a_length_in_metres_is_told_its_unit(tmp_path: Path) -> None:
+    (tmp_path / "manifest.toml").write_text(manifest(CASE, WIRE | {"radius_mm": "0.00018"}), encoding="utf-8")
+    with pytest.raises(ManifestError) as caught:
+        read_manifest(tmp_path / "manifest.toml")
+    assert caught.value.problems[0].endswith("; correct it; is it in metres (0.18 mm)?")
+
+
 def test_the_true_of_python_is_no_schema(tmp_path: Path) -> None:
     path = tmp_path / "manifest.toml"
     path.write_text(manifest(CASE, WIRE).replace("schema = 1", "schema = true"), encoding="utf-8")
