@@ -141,8 +141,12 @@ def predictor_label(name: str) -> str:
 
 
 def fewer_frames(statistics: Mapping[str, Any]) -> str:
-    """``over 5 of 6 frames``: of those with a result, the ones that skill_strongest is over; empty where it is all."""
-    judged, good = (number(statistics.get(key)) for key in ("strongest_frames", "frames_ok"))
+    """``over 5 of 6 frames``: of those with a result, the ones that the skill is over; empty where it is all.
+
+    The skill against the strongest predictor, or against the centreline where none is the strongest.
+    """
+    over = "strongest_frames" if number(statistics.get("skill_strongest")) != NOTHING else "skill_frames"
+    judged, good = (number(statistics.get(key)) for key in (over, "frames_ok"))
     return "" if NOTHING in (judged, good) or float(judged) >= float(good) else f"over {judged} of {good} frames"
 
 

@@ -141,8 +141,9 @@ def _with_intervals(frames: Sequence[Scored], points: Array, values: Row) -> dic
         "rms_high_mm": rms_ends.high,
         "tip_low_mm": tips.low,
         "tip_high_mm": tips.high,
-        **skill(frames, squares, nulls),
     }
+    if own_skill := skill(frames, squares, nulls):
+        found |= own_skill | {"skill_frames": int(np.isfinite(nulls).sum())}
     best, said = strongest(frames, squares, points)
     own = intervals.note(len(names))
     row, told = intervals.fields(found | best, own if said in ("", own) else f"{own}; {SKILL_STRONGEST} {said}")
@@ -155,14 +156,14 @@ SKILL_STRONGEST = "skill_strongest"
 def skill(frames: Sequence[Scored], squares: Array, nulls: Array, rival: str = "") -> dict[str, float]:
     """Skill, with its interval, against a predictor's sums of squares (frames,), over the frames that have one.
 
-    rival : the strongest predictor's name; empty: the centreline.
+    rival : the strongest predictor's name; empty: the centreline.  Empty where these frames hold less than LEAST_SHARE
+    of all points: a skill of the few says nothing of the others' errors, which stand beside it.
     """
-    known = np.isfinite(nulls)
-    if not nulls[known].sum() > 0:
+    known, points = np.isfinite(nulls), np.array([len(frame.error_mm) for frame in frames], dtype=float)
+    if not nulls[known].sum() > 0 or points[known].sum() < LEAST_SHARE * points.sum():
         return {}
     kept = [frame for frame, is_known in zip(frames, known, strict=True) if is_known]
-    squares, nulls = squares[known], nulls[known]
-    points = np.array([len(frame.error_mm) for frame in kept], dtype=float)
+    squares, nulls, points = squares[known], nulls[known], points[known]
     rest = without_each(kept, squares, nulls) if rival == ANOTHER else None
     ends = intervals.of_log_ratio(*by_insertion(kept, squares, nulls, points), rest=rest)
     name, value = SKILL_STRONGEST if rival else "skill", 1.0 - float(squares.sum() / nulls.sum())
