@@ -50,8 +50,8 @@ def replayed(scene: Scene, ensembles: Sequence[Sequence[Member]], arc_mm: Sequen
     Members that share a lumen are simulated side by side, of whichever ensemble; one lumen is held at a time.
     """
 
-    def surface(place: tuple[int, int]) -> tuple[int, float]:
-        return member(place).lumen, member(place).lumen_mm
+    def surface(place: tuple[int, int]) -> tuple[int, float, float]:
+        return member(place).lumen, member(place).lumen_mm, _beyond_radius(scene.wire, member(place))
 
     def member(place: tuple[int, int]) -> Member:
         return ensembles[place[0]][place[1]]
@@ -59,14 +59,23 @@ def replayed(scene: Scene, ensembles: Sequence[Sequence[Member]], arc_mm: Sequen
     vessel = scene.vessel()
     found = [[np.full((len(members), len(arc), 3), np.nan) for arc in arc_mm] for members in ensembles]
     places = [(i, n) for i, members in enumerate(ensembles) for n in range(len(members))]
-    for (number, sigma), group in groupby(sorted(places, key=surface), key=surface):
+    for (number, sigma, shift), group in groupby(sorted(places, key=surface), key=surface):
         own = list(group)
         lumen = displaced(vessel, number, sigma, scene.seed)
+        lumen = lumen.shifted(np.full(lumen.distance.shape, shift)) if shift else lumen
         for (i, n), wires in zip(own, _together(scene, lumen, [member(place) for place in own]), strict=True):
             for frame, wire, arc in zip(found[i], wires, arc_mm, strict=True):
                 if wire is not None:
                     frame[n] = at_arc(wire, arc)
     return found
+
+
+def _beyond_radius(wire: Wire, member: Member) -> float:
+    """By how much the lumen is narrower, mm, beyond what the wire's radius can stand for: negative or 0.
+
+    A lumen that is wider by more than the radius would take a wire of less than none.
+    """
+    return min(wire.radius_mm + member.narrower_mm - NARROWEST_MM, 0.0)
 
 
 def _together(scene: Scene, vessel: VesselWall, members: Sequence[Member]) -> Iterator[list[Array | None]]:

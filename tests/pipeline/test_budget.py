@@ -25,16 +25,18 @@ from pipeline.budget import (
     releases,
     sigmas_of,
 )
-from pipeline.budget.inputs import FRICTION, ROLL_DEG, Sigmas, members_per_lumen
+from pipeline.budget.ensemble import Scene, replayed
+from pipeline.budget.inputs import FRICTION, ROLL_DEG, Member, Sigmas, members_per_lumen
 from pipeline.budget.shapes import Shapes, energy_score_mm, parted, shapes_of
 from pipeline.budget.surface import offset_field
 from pipeline.budget.verdict import ROUND, axes_across, judged, reach_mm
 from pipeline.cli import main
-from pipeline.model import Array, Clamp, Curve, Wire
+from pipeline.model import Array, Clamp, Curve, Lumen, Wall, Wire
 from pipeline.run.stages.budget import Work
 from pipeline.run.stages.known import Frame
-from pipeline.simulate.config import SimulateConfig
+from pipeline.simulate.config import SimulateConfig, SolverConfig
 from pipeline.simulate.evidence import TraceSamples
+from pipeline.simulate.way import Stop, Way
 from pipeline.study.manifest import ManifestError, read_manifest
 from reports import tables
 from reports.figures import figures_of
@@ -92,6 +94,28 @@ def test_the_spread_rests_on_many_lumens(members: int, lumens: int) -> None:
     start = nominal()
     found = drawn(start, sigmas(start), members, members_per_lumen(members))
     assert len({m.lumen for m in found}) == lumens
+
+
+@pytest.mark.parametrize("bias_mm", [-0.1, -0.6, 0.3])
+def test_a_lumen_may_be_wider_by_more_than_the_wire_is_thick(bias_mm: float) -> None:
+    """It was simulated as 0.18 mm wider, the radius of the wire: u at the tip was a fifth to a third too small."""
+    axes = [np.arange(a, b, 0.4) for a, b in ((-4.0, 4.0), (-4.0, 4.0), (-3.0, 24.0))]
+    x, y, _ = np.meshgrid(*axes, indexing="ij")
+
+    def tube(radius: float) -> Lumen:
+        distance = (np.hypot(x, y) - radius).astype(np.float32)
+        grid = Grid(distance, np.full(3, 0.4), np.array([-4.0, -4.0, -3.0]))
+        return Lumen(grid, grid.with_values((distance < 0).astype(np.uint8)))
+
+    clamp = Clamp(np.zeros(3), np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0]))
+    arc, way = np.linspace(0.0, 20.0, 41), Way.reading([Stop(0, 20.0)])
+    found = []
+    for radius, narrower in ((1.2, bias_mm), (1.2 - bias_mm, 0.0)):
+        scene = Scene(WIRE, Wall(2.0, 0.0), tube(radius), SolverConfig(segment_mm=0.5), [ALONG_Z[:41]], way)
+        member = Member(clamp, np.array([20.0]), np.zeros(1), SimulateConfig(), narrower, 0, 0.0)
+        found.append(replayed(scene, [[member]], [arc])[0][0][0])
+    assert abs(found[1][-1, 0]) > 0.4
+    np.testing.assert_allclose(*found, rtol=0.0, atol=2e-3)  # the single precision of the distances
 
 
 def test_a_noisy_scan_has_a_lumen_that_is_less_known() -> None:
