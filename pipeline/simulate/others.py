@@ -9,6 +9,7 @@ from itertools import pairwise, product
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pipeline.arrays.order import turned_back
 from pipeline.arrays.polyline import angle_deg, at_arc, other_units, samples, turns_deg, unit_of
 from pipeline.model import Array, arc_length
 
@@ -18,8 +19,8 @@ guide wire of 0.4 mm is used in blindly."""
 LARGEST_TURN_DEG = 60.0
 """Largest angle between a wire's first 2 mm and the entry's direction."""
 OVER_MM = 2.0
-STEP_BACK_MM, BACK = 0.05, -0.5
-"""A step longer than this (mm) whose cosine to the one before is below this: no wire turns by 120 degrees there."""
+STEP_BACK_MM = 0.05
+"""A step up to this (mm) may be rounding; between longer ones no wire turns back, by 120 degrees and more."""
 TIGHTEST_RADII, QUARTER_DEG = 5.0, 90.0
 """Radius, in the wire's own, of a bend that strains its surface by a fifth; nitinol breaks at about a tenth. A quarter
 of a turn is what it may make on the way of one such quarter, beyond the wire's own curve."""
@@ -62,9 +63,9 @@ def oddity(
     unit : in which its numbers were stated to be, before they became mm.     depth_mm : how deep it should be, where
     that is known: no unit explains a wire that it makes more than three times as long, or as short.
     """
-    back = _turned_back(points_mm)
-    if back:
-        return f"it turns straight back at point {back}: are its points in order, or do they scatter?"
+    back = turned_back(points_mm, STEP_BACK_MM)
+    if len(back):
+        return f"it turns straight back at point {back[0]}: are its points in order, or do they scatter?"
     wrong = _misplaced(points_mm, entry_mm, direction)
     if not wrong:
         return ""
@@ -80,16 +81,6 @@ def oddity(
         if not (scaled and _far_from(depth_mm, length_mm)):
             return f"{wrong}: it would if it were {name}"
     return f"{wrong}; check its coordinates"
-
-
-def _turned_back(points_mm: Array) -> int:
-    """The first inner point (from 1) at which a curve goes back, by more than rounding; 0 for none."""
-    steps = np.diff(points_mm, axis=0)
-    length = np.linalg.norm(steps, axis=1)
-    long = np.flatnonzero(length > STEP_BACK_MM)
-    units = steps[long] / length[long, None]
-    found = np.flatnonzero(np.sum(units[1:] * units[:-1], axis=1) < BACK)
-    return int(long[found[0]]) + 1 if len(found) else 0
 
 
 def _misplaced(points_mm: Array, entry_mm: Array, direction: Array, near_mm: float = AT_ENTRY_MM) -> str:

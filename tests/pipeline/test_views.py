@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Callable
+from itertools import product
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
@@ -14,11 +15,14 @@ import pandas as pd
 import pytest
 from numpy.typing import NDArray
 
+from pipeline.arrays.polyline import at_arc
 from pipeline.cli import main
 from pipeline.compare.config import CompareConfig
+from pipeline.compare.seen import largest_scale, require_in_order, require_not_longer
 from pipeline.compare.views import screen_of, shift_of
 from pipeline.load.geometry import LoadError
 from pipeline.load.views import CArm, View, read_views
+from pipeline.model import arc_length
 from pipeline.run.stages.views import _far_shifts, _limited
 from tests.pipeline.known_study import QUICK, Known, errors_of, peers, run_known, simulated, write_csv
 
@@ -232,24 +236,58 @@ def read_backwards(frame: dict[str, Any]) -> dict[str, Any]:
     return frame | {"points_px": frame["points_px"][::-1]}
 
 
+def exchanged(frame: dict[str, Any]) -> dict[str, Any]:
+    points = frame["points_px"]
+    a, b, c = (int(len(points) * share) for share in (0.25, 0.5, 0.75))
+    return frame | {"points_px": [*points[:a], *points[b:c], *points[a:b], *points[c:]]}
+
+
+def there_and_back_and_there(frame: dict[str, Any]) -> dict[str, Any]:
+    return frame | {"points_px": [*frame["points_px"], *frame["points_px"][::-1], *frame["points_px"]]}
+
+
 @pytest.mark.parametrize(
     ("spoil", "said"),
     [
         (lambda views: views | {"isocentre_mm": NEAR_SOURCE}, "times as large"),
         (lambda views: views | {"frames": [*map(read_backwards, views["frames"])]}, "other way"),
+        (lambda views: views | {"frames": [*map(exchanged, views["frames"])]}, "points_px jumps by"),
+        (lambda views: views | {"frames": [*map(there_and_back_and_there, views["frames"])]}, "mm long at the most"),
+        (lambda views: views | {"frames": views["frames"][::-1]}, "are the frames, or the depths in insertion_mm"),
     ],
-    ids=["isocentre half way to the source", "tip first"],
+    ids=["isocentre half way", "tip first", "pieces exchanged", "three times", "frames out of order"],
 )
 def test_a_view_that_cannot_be_right_fails_by_name(
     known: Known, tmp_path: Path, spoil: Callable[[dict[str, Any]], dict[str, Any]], said: str
 ) -> None:
-    """Both were ok: with half the error in mm, and with the tip's error alone to tell."""
+    """All were ok: with half the error in mm, with the tip's error alone to tell, or with 0.1 mm more."""
     manifest = study(known, tmp_path / "study")
     file = manifest.with_name("projections.json")
     file.write_text(json.dumps(spoil(json.loads(file.read_text(encoding="utf-8")))), encoding="utf-8")
     assert main(["run", str(manifest.parent), "-o", str(tmp_path / "out"), "--until", "compare", *QUICK]) == 1
     assert "view_failed" in set(errors_of(tmp_path / "out")["status"])
     assert said in (tmp_path / "out" / "failures.csv").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("towards_source_mm", [-50.0, 0.0, 50.0])
+@pytest.mark.parametrize("jitter_px", [0.0, 1.0])
+@pytest.mark.parametrize("before_mm", [0.0, 30.0])
+def test_no_right_polyline_is_too_long(towards_source_mm: float, jitter_px: float, before_mm: float) -> None:
+    """Wherever in the field the wire lies, drawn by hand pixel by pixel, and begun before the entry; 3 mm more are."""
+    arm, rng = c_arm(), np.random.default_rng(3)
+    beam = np.array([0.3, -0.95, 0.1]) / np.linalg.norm([0.3, -0.95, 0.1])
+    wire = at_arc(helix(), np.arange(0.0, 100.0, 0.2)) - towards_source_mm * beam
+    pixels = seen(arm, wire) + rng.uniform(-jitter_px, jitter_px, (len(wire), 2))
+    screen = screen_of(arm.matrix, CENTRE, pixels)
+    box = np.array(list(product(*zip(wire.min(axis=0) - 2, wire.max(axis=0) + 2, strict=True))))
+    entry = screen.flat(at_arc(wire, [before_mm]))[0]
+    deep_mm, scale = 99.8 - before_mm, largest_scale(screen, box)
+    require_in_order(screen, pixels, 0)
+    require_not_longer(screen, pixels, entry, scale * (deep_mm + 2.0), "")
+    flat = float(arc_length(screen.flat(at_arc(wire, np.arange(before_mm, 99.8, 0.1))))[-1])
+    assert flat < scale * deep_mm < 1.1 * 1.1 * deep_mm
+    with pytest.raises(ValueError, match=r"mm long in the plane through isocentre_mm, from the entry on"):
+        require_not_longer(screen, pixels, entry, flat - 3.0, "")
 
 
 def test_projections_that_are_none_are_refused(known: Known, tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ from pipeline.arrays.polyline import at_arc
 from pipeline.compare import Comparison
 from pipeline.compare.config import CompareConfig
 from pipeline.compare.nulls import NULLS, TOLD, Clues, PredictorInputs
+from pipeline.compare.seen import largest_scale, require_in_order, require_not_longer
 from pipeline.compare.views import Screen, counted, nulls_in, pair_in, screen_of, values_in
 from pipeline.load.views import View
 from pipeline.model import Array
@@ -31,7 +32,8 @@ def compare_in_views(run: Context, known: Known) -> tuple[Frame, ...]:
     wires = run.share("compare", lambda i, _: rival_wires(run, known, ways[i]), len(ways))
     simulated = simulated_rivals(run, known, ways, wires)
     seen = [PredictorInputs(simulated=simulated.get(frame.index, {})) for frame in known.frames]
-    frames = [_compared(frame, clues, told, config) for frame, told in zip(known.frames, seen, strict=True)]
+    tolerance = run.config.trace.length_tolerance_mm
+    frames = [_compared(frame, clues, told, config, tolerance) for frame, told in zip(known.frames, seen, strict=True)]
     limited = "" if clues is None else _limited(frames, clues, config)
     views = [frame.view for frame in frames if frame.view is not None]
     how = "shifted in the plane to lie best from 40 to 110 mm behind the tip, and scored on the last 40 mm"
@@ -59,7 +61,9 @@ def _clues(run: Context, known: Known) -> Clues | None:
     return Clues(known.lumen, known.clamp, run.case.wire.radius_mm, towards)
 
 
-def _compared(frame: Frame, clues: Clues | None, seen: PredictorInputs, config: CompareConfig) -> Frame:
+def _compared(
+    frame: Frame, clues: Clues | None, seen: PredictorInputs, config: CompareConfig, tolerance_mm: float
+) -> Frame:
     view = frame.view
     if view is None or clues is None or frame.simulated is None or len(frame.simulated.joints_mm) < 2:
         return frame
@@ -67,7 +71,9 @@ def _compared(frame: Frame, clues: Clues | None, seen: PredictorInputs, config: 
     guesses = {name: guess(clues, frame.depth_mm, seen) for name, guess in NULLS.items() if name not in TOLD}
     known_wires = {name: guess for name, guess in guesses.items() if guess is not None}
     try:
+        require_in_order(screen, view.points_px, frame.index)
         pair = pair_in(screen, wire, view.fitted, clues.lumen, clues.way, config)
+        _require_to_depth(frame, view, pair.wire_mm[0], clues, tolerance_mm)
         nulls = nulls_in(screen, known_wires, view.fitted, config)
     except ValueError as error:
         return frame.failed("compare", FrameStatus.VIEW_FAILED, str(error))
@@ -75,6 +81,25 @@ def _compared(frame: Frame, clues: Clues | None, seen: PredictorInputs, config: 
     flat = tuple((curve - screen.isocentre_mm) @ axes for curve in (pair.curve_mm, pair.wire_mm))
     done = Comparison(**vars(pair), values=values_in(pair))
     return replace(frame, comparison=done, nulls_rms_mm=nulls, in_view_mm=flat)
+
+
+def _require_to_depth(frame: Frame, view: View, entry_mm: Array, clues: Clues, tolerance_mm: float) -> None:
+    """ValueError where the polyline is longer than a wire of the frame's depth may be seen.
+
+    entry_mm : (3,) where the entry is seen on the plane, shifted as the wire was.
+    """
+    screen = screen_seen(view)
+    scale, said = largest_scale(screen, corners_mm(clues.lumen.distance)), f"{tolerance_mm:g} mm"
+    if view.fitted:
+        # along a straight wire a shift is not known: that far the entry may be seen elsewhere
+        tolerance_mm += FAR_SHIFT_MM
+        said += f" and {FAR_SHIFT_MM:g} for what a fitted shift may miss"
+    longest = scale * (frame.depth_mm + tolerance_mm)
+    told = (
+        f"and a wire {frame.depth_mm:.2f} mm deep is seen {longest:.1f} mm long at the most (up to {scale:.2f} times "
+        f"enlarged, with trace.length_tolerance_mm = {said})"
+    )
+    require_not_longer(screen, view.points_px, entry_mm, longest, told)
 
 
 def screen_seen(view: View) -> Screen:
