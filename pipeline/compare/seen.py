@@ -29,7 +29,7 @@ def require_in_order(screen: Screen, points_px: Array, frame: int) -> None:
     raise ValueError(
         f"frames[{frame}].points_px jumps by {px:.0f} pixels ({mm:.1f} mm) from point {here} to point {there} (counted "
         "from 0), away from the others or back over them: are its points in order, or do they scatter? Allowed: along "
-        "the wire, from the base to the tip; it may cross itself, turn back once and leave out a stretch. Sort the "
+        "the wire, from the base to the tip; it may cross itself, turn back and leave out a stretch. Sort the "
         "points along the wire, or take out what is off it"
     )
 
