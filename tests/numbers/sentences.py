@@ -71,6 +71,7 @@ def verdicts() -> Numbers:
             "skill_low": one_of(rng, low, NAN),
             "strongest_null": one_of(rng, "roll_unknown", "min_bending", "", None),
             "strongest_frames": one_of(rng, 4, 5, NAN),
+            "skill_frames": 3 + len(rows) % 3,
             "frames_ok": one_of(rng, 4, 5),
             "frames": one_of(rng, 5, 6),
             "frames_fitted": one_of(rng, 0, 1, NAN),
