@@ -1,6 +1,6 @@
 """What the table of a sweep does not show by itself: points in which frames fail, or that were not run."""
 
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from pathlib import Path
 
 import pandas as pd
@@ -18,14 +18,15 @@ def folder_of(head: Mapping[str, str]) -> Path:
     return Path("sweep", f"{head['parameter']}={head['value']}".replace("/", "_"))
 
 
-def not_run(out_dir: Path) -> tuple[list[Path], int]:
+def not_run(out_dir: Path, of: Container[str] | None = None) -> tuple[list[Path], int]:
     """Of what the runs into a folder were to compute for a sweep: the point of each result that is not there, and how
-    many were asked for.
+    many were asked for. of : these cases alone.
 
     A run was ended before it came to them, or folders were removed.
     """
     runs = [(run.get("sweep", ()), run.get("swept", ())) for run in runs_in(out_dir)]
-    asked = sorted({(folder_of(head), case) for heads, cases in runs for head in heads for case in cases})
+    every = {(folder_of(head), case) for heads, cases in runs for head in heads for case in cases}
+    asked = sorted((point, case) for point, case in every if of is None or case in of)
     files = [(point, out_dir / point / "cases" / case / "result.json") for point, case in asked]
     # a ledger without a result: that is damaged, and said as such
     return [p for p, file in files if not (file.exists() or file.with_name("ledger.json").exists())], len(asked)

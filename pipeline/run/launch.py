@@ -38,6 +38,7 @@ from reports.gates import GATES
 from reports.records import read_json
 from reports.run_page import render_index
 from reports.schema import FAILURES, OVERALL_FILE, SUMMARY, SWEEP, TIMINGS
+from reports.sweep import not_run
 
 OVER_ALL = (
     *(SUMMARY.file, OVERALL_FILE, FAILURES.file, TIMINGS.file, SWEEP.file),
@@ -179,6 +180,8 @@ def launch(plan: Plan) -> tuple[Totals, Path]:
     info |= {"provenance": code_state(), "assumptions": plan.assumptions}
     Store(plan.template.cache).trim()
     totals = replace(aggregate(out, info, name), sweep_lost=len(lost_points(out, heads)))
+    # another shard may be at work on the others'
+    totals = replace(totals, sweep_missing=len(not_run(out, plan.ids)[0]) if heads else 0)
     return totals, render_index(out, plan.template.embed, each_on(1 if plan.address else plan.workers))
 
 

@@ -645,3 +645,17 @@ def test_a_folder_where_a_lock_is_meant_is_named(tmp_path: Path) -> None:
     (tmp_path / ".at-work").mkdir()
     with pytest.raises(atomic.WriteError, match="Is a directory; remove this folder"), held(tmp_path, print):
         pass
+
+
+def test_a_result_of_a_sweep_that_is_not_there_when_a_run_ends_is_the_exit_code(
+    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    computed = launch.run_cases
+
+    def run_cases(plan: launch.Plan, jobs: list[launch.Job]) -> None:
+        computed(plan, jobs)
+        shutil.rmtree(next(plan.out.glob("sweep/*/cases/*")))
+
+    monkeypatch.setattr(launch, "run_cases", run_cases)
+    assert run(study, tmp_path / "out", "--until", "compare", "--sweep", "simulate.roll_offset_deg=20") == 1
+    assert "1 result of the sweep not run" in capsys.readouterr().out

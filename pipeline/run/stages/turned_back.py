@@ -29,7 +29,8 @@ def turned_back(distance: Grid, entry_mm: Array, wires: Mapping[int, Array]) -> 
     inside = cKDTree(distance.to_mm(ways.voxels.astype(float)))
     reached = {frame: ways.total[inside.query(joints)[1]] for frame, joints in wires.items()}
     back = {frame: float(way.max() - way[-1]) for frame, way in reached.items()}
-    far = {frame: mm for frame, mm in back.items() if mm > BACK_RADII * -float(distance.values.min())}
+    most = BACK_RADII * -float(distance.values.min())
+    far = {frame: mm for frame, mm in back.items() if mm > most}
     if not far:
         return []
     worst = max(far, key=lambda frame: far[frame])
