@@ -16,5 +16,5 @@ def on_files(files: Files, config: Any) -> Files:
 
 
 def on_page_markdown(markdown: str, **_: Any) -> str:
-    """Point to them."""
-    return markdown.replace("](../reports/pictures/", "](pictures/")
+    """Point to them, from pages in folders too."""
+    return markdown.replace("../reports/pictures/", "pictures/")

@@ -2,7 +2,7 @@
 
 A joint's rest bend and its bend are one rotation vector. One after the other, they handed half of every rest bend on as
 twist: 9 % too soft with segments of 1 mm, of first order. ``python -m tests.solver.test_out_of_plane`` prints the
-figures of docs/evidence.md.
+figures of docs/evidence/solver.md.
 """
 
 from __future__ import annotations
