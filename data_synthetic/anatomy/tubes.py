@@ -86,7 +86,8 @@ class Anatomy:
     @cached_property
     def tables(self) -> kernels.TubeTables:
         """The tubes as the kernels take them."""
-        tubes, balls = self.tubes, [_bounding_balls(t) for t in self.tubes]
+        tubes = self.tubes
+        balls, around = zip(*((_bounding_balls(t, kernels.BLOCK), _bounding_balls(t)) for t in tubes), strict=True)
         return kernels.TubeTables(
             points=np.concatenate([t.points_mm for t in tubes]),
             tangents=np.concatenate([t.tangents for t in tubes]),
@@ -97,6 +98,7 @@ class Anatomy:
             blends=np.array([t.blend_mm for t in tubes]),
             balls=np.concatenate(balls),
             block_starts=np.cumsum([0, *(len(b) for b in balls)]),
+            around=np.concatenate(around),
         )
 
     def distance(self, points_mm: ArrayLike) -> Array:
@@ -116,11 +118,14 @@ class Anatomy:
         return next(t for t in self.tubes if t.name == name)
 
 
-def _bounding_balls(tube: Tube) -> Array:
-    """One (x, y, z, R) per run of samples, such that every ball of the tube there lies within R of its centre."""
-    balls = []
-    for first in range(0, max(1, len(tube.points_mm) - 1), kernels.BLOCK):
-        run = slice(first, first + kernels.BLOCK + 1)
+def _bounding_balls(tube: Tube, block: int | None = None) -> Array:
+    """One (x, y, z, R) per run of samples, such that every ball of the tube there lies within R of its centre.
+
+    block : samples of a run; None is one run of all.
+    """
+    balls, most = [], max(1, len(tube.points_mm) - 1)
+    for first in range(0, most, block or most):
+        run = slice(first, first + (block or most) + 1)
         centre = 0.5 * (tube.points_mm[run].min(axis=0) + tube.points_mm[run].max(axis=0))
         reach = np.max(np.linalg.norm(tube.points_mm[run] - centre, axis=1) + tube.radii_mm[run])
         balls.append([*centre, reach + 0.5 * tube.step_mm])

@@ -17,9 +17,10 @@ Vector = tuple[float, float, float]
 
 BANDS = 11
 """Rows of the lower band matrix: a vertex couples three nodes and two angles, 4 unknowns apart."""
-LOCAL = np.eye(8, BANDS, 4) - np.eye(8, BANDS)
-LOCAL[[3, 7]] = np.eye(BANDS)[[3, 7]]
-"""Edges and angles (8,) about a vertex from its unknowns (11,): node v - 1, angle, node v, angle, node v + 1."""
+PLUS = np.array([-1, -1, -1, 3, 0, 1, 2, 7, 4, 5, 6])
+MINUS = np.array([0, 1, 2, -1, 4, 5, 6, -1, -1, -1, -1])
+"""About a vertex each unknown (11,), of node v - 1, angle, node v, angle, node v + 1, is part of one edge or angle
+(8,) as it is, and of another with its sign changed; -1 is none."""
 HESSIAN_STEP = 1e-6
 """Relative step of the central difference of the exact gradient; its error is about 1e-10 of the stiffness."""
 
@@ -45,6 +46,11 @@ class Shape(NamedTuple):
     points: Array
     tangents: Array
     directors: Array
+
+
+Edge = tuple[Vector, Vector]
+Vertex = tuple[Edge, Edge, Vector]
+"""Tangent and director of the edges before and after a vertex, and its EI / cell, rest curvature x cell, GJ / cell."""
 
 
 @part_of_callers()
@@ -91,10 +97,19 @@ def moved_edge(q: Array, k: int, tangent: Vector, director: Vector) -> tuple[flo
 
 
 @part_of_callers()
-def vertex(q: Array, v: int, shape: Shape, rod: Elastic, g: Array, want_gradient: bool) -> float:
-    """Energy of vertex v and its gradient g (8,) for q = (edge before, its angle, edge after, its angle)."""
-    le, e, a = moved_edge(q, 0, row(shape.tangents, v), row(shape.directors, v))
-    lf, f, b = moved_edge(q, 4, row(shape.tangents, v + 1), row(shape.directors, v + 1))
+def at_vertex(v: int, shape: Shape, rod: Elastic) -> Vertex:
+    """What stays of vertex v while its edges move. Arrays handed on call by call would take as long as the rest."""
+    before, after = row(shape.tangents, v), row(shape.tangents, v + 1)
+    directors = row(shape.directors, v), row(shape.directors, v + 1)
+    return (before, directors[0]), (after, directors[1]), (rod.bend[v], rod.rest[v], rod.twist[v])
+
+
+@part_of_callers()
+def vertex(q: Array, at: Vertex, g: Array, want_gradient: bool) -> float:
+    """Energy of a vertex and its gradient g (8,) for q = (edge before, its angle, edge after, its angle)."""
+    old, new, (bend, rest, twist) = at
+    le, e, a = moved_edge(q, 0, old[0], old[1])
+    lf, f, b = moved_edge(q, 4, new[0], new[1])
     chi = 1.0 + dot(e, f)
     k = cross(e, f)
     k = (2.0 * k[0] / chi, 2.0 * k[1] / chi, 2.0 * k[2] / chi)
@@ -104,7 +119,6 @@ def vertex(q: Array, v: int, shape: Shape, rod: Elastic, g: Array, want_gradient
     u = transport(a, e, f)
     w = cross(u, b)
     tau = np.arctan2(dot(w, f), dot(u, b))
-    bend, rest, twist = rod.bend[v], rod.rest[v], rod.twist[v]
     energy: float = 0.5 * bend * ((k1 - rest) ** 2 + k2 * k2) + 0.5 * twist * tau * tau
     if not want_gradient:
         return energy
@@ -143,36 +157,46 @@ def elastic_energy(points: Array, angles: Array, shape: Shape, rod: Elastic) -> 
     total: float = 0.0
     for v in range(len(rod.bend)):
         load_vertex(points, angles, rod.introducer, v, q)
-        total += vertex(q, v, shape, rod, g, False)
+        total += vertex(q, at_vertex(v, shape, rod), g, False)
         length = np.sqrt(q[4] ** 2 + q[5] ** 2 + q[6] ** 2)
         total += 0.5 * rod.axial / rod.lengths[v] * (length - rod.lengths[v]) ** 2
     return total
 
 
 @part_of_callers()
-def scatter(v: int, g: Array, h: Array, gradient: Array, bands: Array) -> None:
-    """Add the local gradient (8,) and Hessian (8, 8) of vertex v to the system."""
-    full = LOCAL.T @ h @ LOCAL
-    first = 4 * v - 7  # unknown of node v - 1; those of the clamp are negative
-    for i in range(max(0, -first), BANDS):
-        for a in range(8):
-            gradient[first + i] += LOCAL[a, i] * g[a]
-        for j in range(max(0, -first), i + 1):
-            bands[i - j, first + j] += full[i, j]
+def entry(values: Array, a: int) -> float:
+    """Value a of (8,); 0 where there is none."""
+    return values[a] if a >= 0 else 0.0
 
 
 @part_of_callers()
-def bend_and_twist(q: Array, v: int, shape: Shape, rod: Elastic, g: Array, h: Array) -> None:
-    """Fill gradient g (8,) and Hessian h (8, 8) of vertex v; h by central differences of the exact gradient."""
+def scatter(v: int, g: Array, h: Array, gradient: Array, bands: Array) -> None:
+    """Add the local gradient (8,) and Hessian (8, 8) of vertex v to the system."""
+    first = 4 * v - 7  # unknown of node v - 1; those of the clamp are negative
+    for i in range(max(0, -first), BANDS):
+        gradient[first + i] += entry(g, PLUS[i])
+        gradient[first + i] -= entry(g, MINUS[i])
+        for j in range(max(0, -first), i + 1):
+            plus = entry(h[:, PLUS[j]], PLUS[i]) - entry(h[:, PLUS[j]], MINUS[i]) if PLUS[j] >= 0 else 0.0
+            minus = entry(h[:, MINUS[j]], PLUS[i]) - entry(h[:, MINUS[j]], MINUS[i]) if MINUS[j] >= 0 else 0.0
+            bands[i - j, first + j] += plus - minus
+
+
+@part_of_callers()
+def bend_and_twist(q: Array, at: Vertex, length: float, g: Array, h: Array) -> None:
+    """Fill gradient g (8,) and Hessian h (8, 8) of a vertex; h by central differences of the exact gradient.
+
+    length : of the edge after it at rest, mm.
+    """
     gp, gm = np.zeros(8), np.zeros(8)
-    vertex(q, v, shape, rod, g, True)
+    vertex(q, at, g, True)
     for a in range(8):
-        step = HESSIAN_STEP if a % 4 == 3 else HESSIAN_STEP * rod.lengths[v]
+        step = HESSIAN_STEP if a % 4 == 3 else HESSIAN_STEP * length
         kept = q[a]
         q[a] = kept + step
-        vertex(q, v, shape, rod, gp, True)
+        vertex(q, at, gp, True)
         q[a] = kept - step
-        vertex(q, v, shape, rod, gm, True)
+        vertex(q, at, gm, True)
         q[a] = kept
         for b in range(8):
             h[b, a] = 0.5 * (gp[b] - gm[b]) / step
@@ -189,7 +213,7 @@ def elastic_system(shape: Shape, rod: Elastic, gradient: Array, bands: Array) ->
     bands[:] = 0.0
     for v in range(len(rod.bend)):
         load_vertex(shape.points, angles, rod.introducer, v, q)
-        bend_and_twist(q, v, shape, rod, g, h)
+        bend_and_twist(q, at_vertex(v, shape, rod), rod.lengths[v], g, h)
         length = np.sqrt(q[4] ** 2 + q[5] ** 2 + q[6] ** 2)
         strain = 1.0 - rod.lengths[v] / length
         stiffness = rod.axial / rod.lengths[v]

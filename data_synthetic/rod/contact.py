@@ -4,6 +4,8 @@ A wire bears on a crest (an aneurysm's neck, a fork) over sqrt(2 d rho), 0.2 to 
 as that, the wall's energy would depend on where the nodes happen to lie, and the truth would converge in first order.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from data_synthetic.geometry import Array, Index
@@ -18,20 +20,33 @@ CURVATURE_STEP_MM = 1e-4
 """Step of the central difference of the wall's gradient; its Hessian is only needed to a few digits."""
 
 
-def wall_energy(rod: Rod, wall: Wall, points: Array) -> float:
-    """Energy of the wall, N mm: half k d squared per mm of wire that lies d mm too deep in it."""
+class Near(NamedTuple):
+    """Edges (m,) that may touch, the Gauss points (4 m, 3) on them, signed distance (4 m,) and gradient there."""
+
+    edges: Index
+    samples: Array
+    phi: Array
+    normal: Array
+
+
+def near_wall(rod: Rod, wall: Wall, points: Array) -> Near:
+    """Where nodes (n + 1, 3) lie to the wall: energy and forces of one shape are both made of it."""
     edges = _near(rod, wall, points)
-    depth = np.maximum(wall.distance_and_gradient(_samples(points, edges))[0] + rod.radius_mm, 0.0)
-    weight = np.repeat(rod.lengths[edges], len(PLACES)) * np.tile(WEIGHTS, len(edges))
+    samples = _samples(points, edges)
+    return Near(edges, samples, *wall.distance_and_gradient(samples))
+
+
+def wall_energy(rod: Rod, near: Near) -> float:
+    """Energy of the wall, N mm: half k d squared per mm of wire that lies d mm too deep in it."""
+    depth = np.maximum(near.phi + rod.radius_mm, 0.0)
+    weight = np.repeat(rod.lengths[near.edges], len(PLACES)) * np.tile(WEIGHTS, len(near.edges))
     return 0.5 * rod.stiffness_N_mm2 * float(weight @ depth**2)
 
 
-def add_wall(rod: Rod, wall: Wall, points: Array, gradient: Array, bands: Array) -> Array:
+def add_wall(rod: Rod, wall: Wall, near: Near, gradient: Array, bands: Array) -> Array:
     """Add the wall's gradient and Hessian k w (n n' + d grad grad phi); returns its force on every node (n + 1, 3)."""
-    force = np.zeros_like(points)
-    edges = _near(rod, wall, points)
-    samples = _samples(points, edges)
-    phi, normal = wall.distance_and_gradient(samples)
+    edges, samples, phi, normal = near
+    force = np.zeros((len(rod.lengths) + 1, 3))
     touching = np.flatnonzero(phi + rod.radius_mm > 0)
     if not len(touching):
         return force

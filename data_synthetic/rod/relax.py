@@ -8,7 +8,7 @@ from scipy.linalg import LinAlgError, solveh_banded
 from data_synthetic.geometry import Array
 from data_synthetic.rod import _kernels as kernels
 from data_synthetic.rod._kernels import Shape
-from data_synthetic.rod.contact import add_wall, wall_energy
+from data_synthetic.rod.contact import Near, add_wall, near_wall, wall_energy
 from data_synthetic.rod.rod import Rod
 
 LONGEST_MOVE_MM = 0.15
@@ -35,10 +35,11 @@ def relax(rod: Rod, start: Shape, force_N: float, max_iterations: int = 400) -> 
     shape, shift = start, 0.0
     n = len(rod.lengths)
     gradient, bands = np.empty(4 * n), np.empty((kernels.BANDS, 4 * n))
-    energy = _energy(rod, shape, shape.points, np.zeros(n))
+    near = _near(rod, shape.points)
+    energy = _energy(rod, shape, shape.points, np.zeros(n), near)
     residual, contact, count = np.inf, np.zeros((n + 1, 3)), 0
     for count in range(max_iterations):  # noqa: B007 - the count is reported
-        contact = _system(rod, shape, gradient, bands)
+        contact = _system(rod, shape, near, gradient, bands)
         residual = float(np.abs(gradient).max())
         if residual < force_N:
             break
@@ -49,16 +50,21 @@ def relax(rod: Rod, start: Shape, force_N: float, max_iterations: int = 400) -> 
                 break
             shift = max(10.0 * shift, 1e-3)
             continue
-        shape, energy, share = moved
+        shape, near, energy, share = moved
         shift = shift * 0.2 if share > 0.5 and shift > 1e-6 else (0.0 if share > 0.5 else shift)
     return Equilibrium(shape, residual, contact, energy, count, shape.points)
 
 
-def _energy(rod: Rod, shape: Shape, points: Array, angles: Array) -> float:
+def _near(rod: Rod, points: Array) -> Near | None:
+    """Where nodes lie to the wall; None without one."""
+    return near_wall(rod, rod.wall, points) if rod.wall is not None else None
+
+
+def _energy(rod: Rod, shape: Shape, points: Array, angles: Array, near: Near | None) -> float:
     """Energy in N mm of nodes (n + 1, 3), angles (n,) counted from the directors of a shape."""
     total = float(kernels.elastic_energy(points, angles, shape, rod.elastic))
-    if rod.wall is not None:
-        total += wall_energy(rod, rod.wall, points)
+    if near is not None:
+        total += wall_energy(rod, near)
     if rod.sliders is not None:
         total += rod.sliders.energy(points)
     if rod.loads_N is not None:
@@ -66,16 +72,16 @@ def _energy(rod: Rod, shape: Shape, points: Array, angles: Array) -> float:
     return total
 
 
-def _system(rod: Rod, shape: Shape, gradient: Array, bands: Array) -> Array:
+def _system(rod: Rod, shape: Shape, near: Near | None, gradient: Array, bands: Array) -> Array:
     """Fill gradient and Hessian; returns the wall's force on every node (n + 1, 3)."""
     kernels.elastic_system(shape, rod.elastic, gradient, bands)
     if rod.loads_N is not None:
         gradient.reshape(-1, 4)[:, 1:] -= rod.loads_N[1:]
     if rod.sliders is not None:
         rod.sliders.add(shape.points, gradient, bands)
-    if rod.wall is None:
+    if rod.wall is None or near is None:
         return np.zeros_like(shape.points)
-    return add_wall(rod, rod.wall, shape.points, gradient, bands)
+    return add_wall(rod, rod.wall, near, gradient, bands)
 
 
 def _newton_step(gradient: Array, bands: Array, shift: float) -> tuple[Array, float]:
@@ -91,7 +97,7 @@ def _newton_step(gradient: Array, bands: Array, shift: float) -> tuple[Array, fl
 
 def _line_search(
     rod: Rod, shape: Shape, energy: float, gradient: Array, step: Array
-) -> tuple[Shape, float, float] | None:
+) -> tuple[Shape, Near | None, float, float] | None:
     """The first shortened step that lowers the energy enough; None when none does."""
     move = step.reshape(-1, 4)
     longest = float(np.max(np.linalg.norm(move[:, 1:], axis=1)))
@@ -103,10 +109,11 @@ def _line_search(
         points = shape.points.copy()
         points[1:] += share * move[:, 1:]
         angles = np.ascontiguousarray(share * move[:, 0])
-        trial = _energy(rod, shape, points, angles)
+        near = _near(rod, points)
+        trial = _energy(rod, shape, points, angles, near)
         if trial <= energy + 1e-4 * share * slope + noise:
             tangents, directors = shape.tangents.copy(), shape.directors.copy()
             kernels.carry(points, angles, tangents, directors, False)
-            return Shape(points, tangents, directors), trial, share
+            return Shape(points, tangents, directors), near, trial, share
         share *= 0.5
     return None

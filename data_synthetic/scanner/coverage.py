@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from data_synthetic._compile import on_disk, part_of_callers
-from data_synthetic.anatomy._kernels import FAR, TubeTables, room_for, tubes_around, union_distance
+from data_synthetic.anatomy._kernels import BLENDS, FAR, TubeTables, room_for, tubes_around, union_distance
 from data_synthetic.anatomy.tubes import Anatomy
 from data_synthetic.geometry import Array, Index, ScanGrid, Volume, arc_lengths, at_arc, voxels_near
 from data_synthetic.scanner.phantom import Phantom
@@ -62,8 +62,6 @@ def splat(index: Array, weights: Array, sigma: Array, out: Volume) -> None:
 
 SUBSAMPLES = 4
 """Sub-voxels per axis where the wall crosses a voxel, the wall being a plane in each."""
-BLENDS = 2.0
-"""Widths of blending beyond which a tube changes no bit; with 1 it changes 4e-6 of a voxel."""
 
 
 @on_disk()

@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from data_synthetic.anatomy.tubes import Anatomy, ball
-from data_synthetic.rod.contact import add_wall, wall_energy
+from data_synthetic.rod.contact import add_wall, near_wall, wall_energy
 from data_synthetic.rod.rod import Rod, TrueWire, make_rod
 
 Array = NDArray[np.float64]
@@ -28,7 +28,7 @@ def test_energy_is_the_integral_of_half_k_d_squared() -> None:
     exact = 0.5 * 2.0 * 0.68**3 / 3.0  # d = z - 2.82 from there to z = 3.5
     for step in (0.4, 0.2):
         rod, points = rod_across(step)
-        assert wall_energy(rod, SAC, points) == pytest.approx(exact, rel=1e-3)
+        assert wall_energy(rod, near_wall(rod, SAC, points)) == pytest.approx(exact, rel=1e-3)
 
 
 def test_gradient_and_hessian_are_those_of_the_energy() -> None:
@@ -36,7 +36,7 @@ def test_gradient_and_hessian_are_those_of_the_energy() -> None:
     points = points + np.random.default_rng(0).normal(0, 0.01, points.shape) * [1, 1, 0]
     n = len(points) - 1
     gradient, bands = np.zeros(4 * n), np.zeros((11, 4 * n))
-    force = add_wall(rod, SAC, points, gradient, bands)
+    force = add_wall(rod, SAC, near_wall(rod, SAC, points), gradient, bands)
     np.testing.assert_allclose(gradient.reshape(-1, 4)[:, 1:], -force[1:])
     pressed = np.flatnonzero(np.linalg.norm(force, axis=1) > 0)
     assert len(pressed) > 5
@@ -44,7 +44,9 @@ def test_gradient_and_hessian_are_those_of_the_energy() -> None:
         for a in range(3):
             step = np.zeros_like(points)
             step[node, a] = 1e-6
-            slope = wall_energy(rod, SAC, points + step) - wall_energy(rod, SAC, points - step)
+            slope = wall_energy(rod, near_wall(rod, SAC, points + step)) - wall_energy(
+                rod, near_wall(rod, SAC, points - step)
+            )
             assert slope / 2e-6 == pytest.approx(-force[node, a], abs=1e-8)
             column = 4 * (node - 1) + 1 + a
             change = derivative(rod, points, step)
@@ -56,7 +58,7 @@ def derivative(rod: Rod, points: Array, step: Array) -> Array:
     out = []
     for moved in (points + step, points - step):
         gradient = np.zeros(4 * (len(points) - 1))
-        add_wall(rod, SAC, moved, gradient, np.zeros((11, len(gradient))))
+        add_wall(rod, SAC, near_wall(rod, SAC, moved), gradient, np.zeros((11, len(gradient))))
         out.append(gradient)
     return (out[0] - out[1]) / 2e-6
 
@@ -65,4 +67,4 @@ def test_a_wire_far_from_the_wall_is_not_pushed() -> None:
     rod, points = rod_across(0.4)
     rod, inside = replace(rod, wall=SAC), points[:8]
     shorter = replace(rod, elastic=rod.elastic._replace(lengths=rod.lengths[:7]))
-    assert wall_energy(shorter, SAC, inside) == 0.0
+    assert wall_energy(shorter, near_wall(shorter, SAC, inside)) == 0.0

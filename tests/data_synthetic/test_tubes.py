@@ -44,6 +44,18 @@ def test_gradient_is_the_derivative(junction: Anatomy) -> None:
         assert np.quantile(np.abs(slope - gradient[:, a]), 0.99) < 1e-7  # the rest lies on ridges
 
 
+@pytest.mark.parametrize("spread_mm", [0.02, 0.5, 30.0])
+def test_a_place_is_as_far_whatever_comes_before_it(junction: Anatomy, spread_mm: float) -> None:
+    """Tubes that the place before shows to be too far are not looked at: that must change no bit."""
+    along = junction.tubes[1].points_mm
+    points = along + np.random.default_rng(3).normal(0.0, spread_mm, along.shape)
+    points[7, 0] = np.nan
+    together = junction.distance_and_gradient(points)
+    alone = [junction.distance_and_gradient(point) for point in points]
+    np.testing.assert_array_equal(together[0], np.concatenate([phi for phi, _ in alone]))
+    np.testing.assert_array_equal(together[1], np.concatenate([slope for _, slope in alone]))
+
+
 @settings(max_examples=50, deadline=None)
 @given(st.lists(st.floats(-15, 15), min_size=6, max_size=6))
 def test_distance_is_one_lipschitz(junction_points: list[float]) -> None:
