@@ -25,7 +25,7 @@ from pipeline.run.stages.dim_ends import barely_seen, faint_ends, own_dim_ends
 from pipeline.run.stages.known import Frame
 from pipeline.run.stages.repeated import once
 from pipeline.run.stages.trace import _last_curve, _Part
-from pipeline.run.stages.way import with_depth
+from pipeline.run.stages.way import with_depths
 from pipeline.simulate.clamp import Clamp
 from pipeline.status import FrameStatus
 from pipeline.trace import DIM_FROM_TIP, FAINT_BEYOND, GOES_ON, of_catheter, of_length
@@ -257,16 +257,26 @@ def test_the_length_of_a_trace_that_is_not_trusted_is_no_depth_where_one_is_stat
     lengths = [10.0, 14.0, 7.0, 22.0]
     seen = frames(lengths, DEPTHS[:4])
     seen[2] = seen[2].failed("trace", FrameStatus.LENGTH_MISMATCH, "")
-    assert [with_depth(f, "traced", clamp).depth_mm for f in seen] == [10.0, 14.0, 18.0, 22.0]
+    assert [f.depth_mm for f in with_depths(seen, "traced", clamp)] == [10.0, 14.0, 18.0, 22.0]
     unstated = [replace(f, expected_mm=float("nan")) for f in seen]
-    assert [with_depth(f, "traced", clamp).depth_mm for f in unstated] == lengths
-    assert [with_depth(f, "manifest", clamp).depth_mm for f in seen] == DEPTHS[:4]
+    assert [f.depth_mm for f in with_depths(unstated, "traced", clamp)] == lengths
+    assert [f.depth_mm for f in with_depths(seen, "manifest", clamp)] == DEPTHS[:4]
+
+
+def test_a_stated_depth_is_taken_as_the_traced_ones_show_that_it_was_read() -> None:
+    """All wires 1.2 mm longer than stated: in the frame without a trace the wire was drawn back by that."""
+    clamp = Clamp(np.zeros(3), np.array([0.0, 0.0, 1.0]))
+    seen = frames([depth + 1.2 for depth in DEPTHS[:5]], DEPTHS[:5])
+    seen[2] = replace(seen[2], curve=None)
+    assert [f.depth_mm for f in with_depths(seen, "traced", clamp)] == pytest.approx([d + 1.2 for d in DEPTHS[:5]])
+    assert [f.depth_mm for f in with_depths(seen, "manifest", clamp)] == DEPTHS[:5]
+    assert with_depths(seen[1:], "traced", clamp)[1].depth_mm == DEPTHS[2], "three traces do not tell"
 
 
 def test_a_tip_behind_the_entry_names_entry_direction() -> None:
     """It was "depths_mm: got -0.0317; allowed: a number from 0", of the solver, and the whole case was lost."""
     clamp = Clamp(np.array([0.0, 0.0, 10.5]), np.array([0.0, 0.0, 1.0]))
-    frame = with_depth(frames([10.0], [float("nan")])[0], "traced", clamp)
+    (frame,) = with_depths(frames([10.0], [float("nan")]), "traced", clamp)
     assert (frame.status, np.isnan(frame.depth_mm)) == ("simulate_failed", True)
     assert "ends 0.50 mm behind the entry" in frame.message
     assert "entry_direction" in frame.message

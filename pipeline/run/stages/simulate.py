@@ -6,7 +6,7 @@ from time import perf_counter
 
 import numpy as np
 
-from pipeline.model import Clamp, OverWire
+from pipeline.model import OverWire
 from pipeline.run.log import Log
 from pipeline.run.stages.clamp import clamp_of
 from pipeline.run.stages.clues import beside_clues, clues_of
@@ -16,7 +16,7 @@ from pipeline.run.stages.known import Context, Frame, Known
 from pipeline.run.stages.others import frames_of_others
 from pipeline.run.stages.roll import with_fitted_roll
 from pipeline.run.stages.turned_back import turned_back
-from pipeline.run.stages.way import way_of, with_depth
+from pipeline.run.stages.way import way_of, with_depths
 from pipeline.simulate import LEVELS, altered, insertion_of, simulate, wall_of
 from pipeline.simulate.resolution import LARGEST_JOINT_TURN_DEG, Resolved, lengths_mm, resolve
 from pipeline.status import FrameStatus, StageError
@@ -43,7 +43,8 @@ def _simulated(run: Context, known: Known) -> Known:
     with run.log.timed("clamp"):
         known = with_fitted_roll(run, known)
         clamp = clamp_of(run, known)
-    known = replace(known, frames=_with_depths(run, known, clamp), clamp=clamp)
+    frames = with_depths(known.frames, run.config.simulate.depth, clamp)
+    known = replace(known, frames=tuple(frames), clamp=clamp)
     known = replace(known, clues=clues_of(run, known))
     if run.case.simulated is None:
         return _replayed(run, known)
@@ -170,7 +171,3 @@ def _told(frame: int, snap: Snap) -> str:
         f"frame {frame}: the simulated wire gave way between {snap.from_mm:.2f} and {snap.to_mm:.2f} mm "
         f"({1e3 * snap.released_N_mm:.3g} µJ released, a joint moved by {snap.moved_mm:.2f} mm); {hangs}"
     )
-
-
-def _with_depths(run: Context, known: Known, clamp: Clamp) -> tuple[Frame, ...]:
-    return tuple(with_depth(frame, run.config.simulate.depth, clamp) for frame in known.frames)

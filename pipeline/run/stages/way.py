@@ -11,6 +11,9 @@ from pipeline.simulate.clamp import depth_from
 from pipeline.simulate.way import Stop, Way
 from pipeline.status import FrameStatus
 
+FEWEST = 4
+"""Traced frames from which on it is asked by how much all are deeper than stated: two of fewer may be off at once."""
+
 
 def stop_of(frame: Frame) -> Stop:
     """What the hand had done by a frame whose depth is known."""
@@ -27,7 +30,7 @@ def passed(frames: Sequence[Frame], read: Collection[int]) -> list[Stop]:
 
 def passed_at(frames: Sequence[Frame], read: Collection[int], source: str, clamp: Clamp) -> list[Stop]:
     """The same before the depths of a case are settled, or with those of another ``clamp`` or ``source``."""
-    return passed([with_depth(frame, source, clamp) for frame in frames if frame.index not in read], read)
+    return passed(with_depths(frames, source, clamp), read)
 
 
 def way_of(run: Context, frames: Sequence[Frame], read: Sequence[Frame]) -> Way:
@@ -46,11 +49,21 @@ def by_trace(frame: Frame, source: str) -> bool:
     return source == "traced" and frame.traced and bool(told)
 
 
-def with_depth(frame: Frame, source: str, clamp: Clamp) -> Frame:
-    """The frame with the depth to simulate: the traced length, else the manifest's; failed where neither is known."""
-    depth = frame.expected_mm
-    if frame.curve is not None and by_trace(frame, source):
-        depth = depth_from(clamp, frame.curve)
+def with_depths(frames: Sequence[Frame], source: str, clamp: Clamp) -> list[Frame]:
+    """The frames with the depth to simulate: the traced length, else the manifest's; failed where neither is known.
+
+    Where depths are traced, a stated one is taken as the traced ones show that it was read: hands count from a mark of
+    their own, and a wire that is drawn back by that in one frame alone lies elsewhere in those that follow.
+    """
+    traced = {f.index: depth_from(clamp, f.curve) for f in frames if f.curve is not None and by_trace(f, source)}
+    apart = np.array([traced[f.index] - f.expected_mm for f in frames if f.index in traced and f.trusted_curve])
+    apart = apart[np.isfinite(apart)]
+    off = float(np.median(apart)) if len(apart) >= FEWEST else 0.0
+    return [_at(frame, traced.get(frame.index, frame.expected_mm + off)) for frame in frames]
+
+
+def _at(frame: Frame, depth: float) -> Frame:
+    """The frame at a depth, mm; failed where that is NaN or behind the entry."""
     if depth <= 0.0:
         note = f"the traced wire ends {-depth:.2f} mm behind the entry, where nothing can be pushed to; "
         note += "check that entry_direction points the way the wire is pushed, and that entry_mm lies before its tip"
