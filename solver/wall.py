@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from solver._kernels.data import Field
-from solver._kernels.field import bounds, look_up, prefilter
+from solver._kernels.field import BLOCK, bounds, look_up, prefilter
 from solver.creases import creases
 from solver.doors import ANYWHERE_MM, FAR_MM, Array, Found, Range, instance, number, numbers
 from solver.errors import refuse
@@ -104,6 +104,13 @@ def _padded(coefficients: Array) -> NDArray[np.float32]:
     return out
 
 
+def _bounds(coefficients: NDArray[np.float32], to_index: Array) -> tuple[float, float]:
+    """See the kernel."""
+    inside = np.empty([(n - 1) // BLOCK + 1 for n in coefficients.shape], np.uint8)
+    gap, slope = bounds(coefficients, to_index, inside)
+    return float(gap), float(slope)
+
+
 @dataclass(frozen=True, eq=False)
 class VesselWall:
     """The wall of a lumen, given by the signed distance to it in mm, negative inside. Its law is ``_kernels.wall_law``.
@@ -132,7 +139,7 @@ class VesselWall:
         prefilter(values)
         to_index = np.ascontiguousarray((self.distance.direction / self.distance.spacing_mm).T)
         coefficients = _padded(values)
-        gap, slope = (float(bound) for bound in bounds(coefficients, to_index))
+        gap, slope = _bounds(coefficients, to_index)
         origin, spacing = np.array(self.distance.origin_mm), float(self.distance.spacing_mm.min())
         object.__setattr__(self, "field", Field(coefficients, to_index, origin, gap, slope, spacing, marks))
 
@@ -160,7 +167,7 @@ class VesselWall:
         values = self.distance.values + offset
         prefilter(offset)
         coefficients = self.field.coefficients + _padded(offset)
-        gap, slope = (float(bound) for bound in bounds(coefficients, self.field.to_index))
+        gap, slope = _bounds(coefficients, self.field.to_index)
         other, moved = copy(self), self.distance.with_values(read_only(values))
         object.__setattr__(other, "distance", moved)
         object.__setattr__(other, "field", self.field._replace(coefficients=coefficients, gap=gap, slope=slope))

@@ -21,22 +21,35 @@ Cell = tuple[int, int, int, float, float, float]
 SIDE_BY_SIDE = 64
 """Lines that are filtered together: 256 values of each are 128 kB."""
 
+TOGETHER = 32
+"""Lines along the last axis that are filtered together."""
+
 # Cells along an edge of the blocks over which bounds are taken: small enough to stay local, large enough to be cheap.
 BLOCK = 4
 
 
 @kernel
-def solve_natural(lines: Any, scratch: Any) -> None:
+def solve_natural(lines: Any, pivots: Any) -> None:
     """Replace the values of lines side by side (n, w) by their natural B-spline coefficients (Thomas on 1 4 1)."""
     n, w = lines.shape
-    scratch[0] = 0.0
     for i in range(1, n - 1):
-        scratch[i] = 1.0 / (4.0 - scratch[i - 1])
         for m in range(w):
-            lines[i, m] = (6.0 * lines[i, m] - lines[i - 1, m]) * scratch[i]
+            lines[i, m] = (6.0 * lines[i, m] - lines[i - 1, m]) * pivots[i]
     for i in range(n - 2, 0, -1):
         for m in range(w):
-            lines[i, m] -= scratch[i] * lines[i + 1, m]
+            lines[i, m] -= pivots[i] * lines[i + 1, m]
+
+
+@kernel
+def solve_rows(rows: Any, pivots: Any) -> None:
+    """The same for lines one after the other in memory (w, n): a step of each in turn, so that none waits for its own."""
+    w, n = rows.shape
+    for i in range(1, n - 1):
+        for m in range(w):
+            rows[m, i] = (6.0 * rows[m, i] - rows[m, i - 1]) * pivots[i]
+    for i in range(n - 2, 0, -1):
+        for m in range(w):
+            rows[m, i] -= pivots[i] * rows[m, i + 1]
 
 
 @entry_point
@@ -45,13 +58,18 @@ def prefilter(values: Any) -> None:
 
     SIDE_BY_SIDE lines at a time: one alone would fetch a row of the cache for each of its values (3.6 times as long).
     """
-    flat, scratch = values.reshape(values.size), np.empty(max(values.shape))
-    stride = 1
-    for n in values.shape[::-1]:
+    flat, pivots = values.reshape(values.size), np.zeros(max(values.shape))
+    for i in range(1, pivots.size - 1):
+        pivots[i] = 1.0 / (4.0 - pivots[i - 1])
+    n = values.shape[2]
+    for first in range(0, flat.size // n, TOGETHER):
+        solve_rows(flat.reshape(flat.size // n, n)[first : first + TOGETHER], pivots)
+    stride = n
+    for n in values.shape[1::-1]:
         for start in range(0, flat.size, n * stride):
             lines = flat[start : start + n * stride].reshape(n, stride)
             for first in range(0, stride, SIDE_BY_SIDE):
-                solve_natural(lines[:, first : first + SIDE_BY_SIDE], scratch)
+                solve_natural(lines[:, first : first + SIDE_BY_SIDE], pivots)
         stride *= n
 
 
@@ -218,7 +236,7 @@ def store_jet(jets: Any, n: int, jet: tuple[Four, Six]) -> float:
 
 
 @entry_point
-def bounds(c: Any, to_index: Any) -> tuple[float, float]:
+def bounds(c: Any, to_index: Any, inside: Any) -> tuple[float, float]:
     """Return (gap, slope) of a Field: proven bounds, from differences of the coefficients c.
 
     gap: along one axis the spline differs from the linear interpolant of its coefficients by at most
@@ -226,12 +244,17 @@ def bounds(c: Any, to_index: Any) -> tuple[float, float]:
     slope: each component of the gradient averages first differences along its axis.
     Both are taken over blocks of cells that may hold a negative distance, the only ones where a point can be
     clear of the wall: a point that starts clear meets such a cell's bound before it can touch.
+    inside : room for a mark (uint8) of each block of BLOCK coefficients along each axis.
     """
     gap, slope = 0.0, 0.0
     n = BLOCK + 3
+    mark_inside(c, inside)
     for i in range(0, c.shape[0] - 3, BLOCK):
         for j in range(0, c.shape[1] - 3, BLOCK):
             for k in range(0, c.shape[2] - 3, BLOCK):
+                p, q, r = i // BLOCK, j // BLOCK, k // BLOCK
+                if inside[p : p + 2, q : q + 2, r : r + 2].max() == 0:
+                    continue
                 block = c[i : i + n, j : j + n, k : k + n]
                 if block.min() > 0.0:
                     continue
@@ -242,6 +265,17 @@ def bounds(c: Any, to_index: Any) -> tuple[float, float]:
                     square += first**2 * (to_index[a, 0] ** 2 + to_index[a, 1] ** 2 + to_index[a, 2] ** 2)
                 slope, gap = max(slope, math.sqrt(square)), max(gap, second / 6)
     return gap, slope
+
+
+@kernel
+def mark_inside(c: Any, inside: Any) -> None:
+    """Mark with 1, else 0, the blocks of which a coefficient is not positive; each coefficient is looked at once."""
+    inside[:] = 0
+    for i in range(c.shape[0]):
+        for j in range(c.shape[1]):
+            for k in range(c.shape[2]):
+                if c[i, j, k] <= 0.0:
+                    inside[i // BLOCK, j // BLOCK, k // BLOCK] = 1
 
 
 @kernel
