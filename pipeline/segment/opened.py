@@ -10,6 +10,7 @@ from pipeline.arrays.grids import in_memory_order, reorder
 from pipeline.model import Array, Curve, Lumen
 from pipeline.segment._kernels.solids import cones
 from pipeline.segment.contact import counted
+from pipeline.segment.pieces import Gap, between_pieces, crossed
 from solver.grid import Grid, read_only
 
 OUTSIDE_VOXELS = 1.0
@@ -35,7 +36,7 @@ def opened(
     """The lumen with room for every trace of a wire of this radius, and a warning that says where it had none.
 
     The lumen itself where all traces lie within it; with a warning alone where they lie no further outside than its
-    wall may yield.
+    wall may yield. Where they run from one piece of a given lumen to another it is opened, narrow as the gap may be.
 
     stiffness_N_mm2 : of the wall.     given : whether it was given as a file instead of segmented.
     """
@@ -44,20 +45,44 @@ def opened(
     voxel, most = float(spacing.min()), float(np.max(grid.values))
     limit, allowed = OUTSIDE_VOXELS * voxel, may_lie_outside_mm(voxel, stiffness_N_mm2)
     _, pressed = _outside(grid, curves, limit)
-    if not pressed:
+    gaps = between_pieces(grid, curves) if given else []
+    if not pressed and not gaps:
         return lumen
     links, said = _outside(grid, curves, allowed)
-    if not said:
-        why = f"no further than a wall of {stiffness_N_mm2:g} N/mm² yields, and it was not opened"
-        text = f"{_told(pressed, limit)}: {why}; look whether vessel is missing there"
-        return replace(lumen, warnings=(*lumen.warnings, text))
-    first, last = (np.concatenate(ends) * spacing for ends in zip(*links, strict=True))
-    values, radius = np.array(grid.values), np.full(len(first), radius_mm + ROOM_VOXELS * voxel)
-    cones(first, last, radius, radius, spacing, most, values)
     do = "correct the file of the lumen" if given else "give the lumen as a file (manifest key lumen)"
-    text = f"{_told(said, allowed)}; the lumen was opened there: look whether vessel is missing, or {do}"
-    distance = reorder(grid.with_values(read_only(values)), axes)
-    return replace(lumen, distance=distance, warnings=(*lumen.warnings, text))
+    do = f"the lumen was opened there: look whether vessel is missing, or {do}"
+    told, rooms = [], []
+    if gaps:
+        told.append(f"{crossed(gaps)}; {do}")
+        rooms.append(_joined(gaps))
+    if said:
+        told.append(f"{_told(said, allowed)}; {do}")
+        rooms.append(_along(links, radius_mm + ROOM_VOXELS * voxel))
+    elif pressed:
+        why = f"no further than a wall of {stiffness_N_mm2:g} N/mm² yields, and it was not opened"
+        told.append(f"{_told(pressed, limit)}: {why}; look whether vessel is missing there")
+    values = np.array(grid.values)
+    for (first, last), (before, after) in rooms:
+        cones(first * spacing, last * spacing, before, after, spacing, most, values)
+    distance = reorder(grid.with_values(read_only(values)), axes) if rooms else lumen.distance
+    return replace(lumen, distance=distance, warnings=(*lumen.warnings, *told))
+
+
+Room = tuple[tuple[Array, Array], tuple[Array, Array]]
+"""Both ends (n, 3) of round cones, as indices, and their radii (n,) there, mm."""
+
+
+def _along(links: Sequence[tuple[Array, Array]], radius_mm: float) -> Room:
+    """Room for a wire along the pieces of curves."""
+    first, last = (np.concatenate(ends) for ends in zip(*links, strict=True))
+    radius = np.full(len(first), radius_mm)
+    return (first, last), (radius, radius)
+
+
+def _joined(gaps: Sequence[Gap]) -> Room:
+    """Vessel across gaps, as wide as on both sides: a hole of the wire's own width would lead the simulated one."""
+    ends, radii = np.array([gap.ends for gap in gaps]), np.array([gap.radii_mm for gap in gaps])
+    return (ends[:, 0], ends[:, 1]), (radii[:, 0].copy(), radii[:, 1].copy())
 
 
 def _outside(grid: Grid, curves: Sequence[Curve], allowed: float) -> tuple[list[tuple[Array, Array]], list[Place]]:

@@ -42,7 +42,7 @@ def solve_natural(lines: Any, pivots: Any) -> None:
 
 @kernel
 def solve_rows(rows: Any, pivots: Any) -> None:
-    """The same for lines one after the other in memory (w, n): a step of each in turn, so that none waits for its own."""
+    """The same for lines one after the other in memory (w, n): a step of each in turn, so that none waits on itself."""
     w, n = rows.shape
     for i in range(1, n - 1):
         for m in range(w):

@@ -7,6 +7,7 @@ import pytest
 
 from pipeline.model import Curve, Lumen
 from pipeline.segment.opened import opened
+from pipeline.segment.pieces import in_pieces
 from solver.grid import Grid
 
 H = 0.3
@@ -75,3 +76,36 @@ def test_a_soft_wall_that_a_wire_presses_into_is_not_opened() -> None:
     assert found.distance is lumen.distance
     assert "no further than a wall of 0.03 N/mm² yields, and it was not opened" in found.warnings[1]
     assert "allowed 0.33" in opened(lumen, [pressed], 0.2, 2.0, given=True).warnings[1]
+
+
+def cut(gap_mm: float) -> Lumen:
+    """A tube of 1.5 mm along z with a slice missing about 9 mm."""
+    x, y, z = np.meshgrid(*(H * np.arange(n) for n in (40, 40, 60)), indexing="ij")
+    values = np.maximum(np.hypot(x - 6.0, y - 6.0) - 1.5, 0.5 * gap_mm - np.abs(z - 9.0))
+    return Lumen(Grid(np.minimum(values, 3.0).astype(np.float32), np.full(3, H), np.array([1.0, -2.0, 3.0])))
+
+
+@pytest.mark.parametrize("gap_mm", [0.65, 1.3])
+def test_a_given_lumen_with_a_slice_missing_is_joined_where_wires_cross(gap_mm: float) -> None:
+    """Two voxels were less than a trace may lie outside: all was ok, and the simulated wire turned back there."""
+    lumen, crossing = cut(gap_mm), traced(wire(6.6, 2.0, 16.0))
+    found = opened(lumen, [traced(wire(6.0, 2.0, 7.0)), crossing], 0.2, given=True)
+    assert "from one piece of the given lumen to another, 1 time" in found.warnings[0]
+    assert "[7.6, 4.0, 1" in found.warnings[0]
+    across = found.distance.values[:, :, 30]
+    # as wide as the vessel on both sides, about its own middle and not about the trace
+    np.testing.assert_allclose(across[20, 20], -1.5, rtol=0.0, atol=0.15)
+    assert np.all(across[20 - 4 : 20 + 5, 20] < 0.0)
+    assert opened(lumen, [traced(wire(6.0, 2.0, 7.0))], 0.2, given=True) is lumen, "nothing crosses"
+
+
+def test_a_given_lumen_in_pieces_is_told_where_no_wire_crosses() -> None:
+    (said,) = in_pieces(cut(0.65).distance, [7.0, 4.0, 4.0])
+    assert "in 2 pieces" in said
+    assert "12.0] mm; is a slice missing" in said
+    assert in_pieces(tube("C").distance, [7.0, 4.0, 4.0])
+    assert in_pieces(cut(0.0).distance, [7.0, 4.0, 4.0]) == []
+    apart = cut(0.65).distance
+    far = np.array(apart.values)
+    far[:, :, 20:40] = 3.0
+    assert in_pieces(apart.with_values(far), [7.0, 4.0, 4.0]) == [], "6 mm apart: vessels of their own"

@@ -18,6 +18,7 @@ from pipeline.segment import segment
 from pipeline.segment.given import given_lumen
 from pipeline.segment.levels import failed
 from pipeline.segment.opened import outside_mm
+from pipeline.segment.pieces import in_pieces
 from pipeline.segment.shown import beside_the_wall
 from pipeline.status import StageError
 from pipeline.trace.warm import warm_up
@@ -32,6 +33,7 @@ def segment_vessel(run: Context, known: Known) -> Known:
             lumen = given_lumen(read_lumen(case.lumen, config.segment.least_voxels), config.segment)
         _require_entry(run, lumen)
         log.assumptions += lumen.warnings
+        log.warnings += in_pieces(lumen.distance, case.entry_mm)
         log.warnings += _held_against(run, known, lumen)
         return replace(known, lumen=lumen)
     assert known.scans is not None
