@@ -19,14 +19,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.arrays.polyline import angle_deg, at_arc, tangents
+from pipeline.arrays.polyline import at_arc, tangents
 from pipeline.model import Array, Clamp, Curve
+from pipeline.simulate.clamp_told import REACH_MM, clamp_told, left_out
 from pipeline.simulate.departures import departed
 from pipeline.simulate.evidence import TraceSamples, covariance_of, disagreeing, posterior, rougher, roughness_mm
 from solver import Solution
 
-REACH_MM = 10.0
-"""Length of wire behind the entry that is fitted: a trace's error of 0.02 mm turns it by a tenth of a degree."""
 FIRST_MM, LAST_MM, EVERY_MM = 0.5, 0.5, 0.5  # the trace's own ends are left out
 MOST_FRAMES = 12
 """Frames that are fitted, the least deep ones: half of a trace's noise is the reference scan's, which all share, so
@@ -38,7 +37,6 @@ and the part of the standard deviations below which a step is the last one."""
 TIP_VOXELS = 0.25
 """What a traced tip may be off along the wire beyond its own standard deviation. It matters where rest curvature ends
 near the entry: 0.3 mm deeper turns such a wire by 2.6 degrees."""
-FARTHEST_MM, LARGEST_TURN_DEG = 1.0, 10.0
 TANGENT_MM = 0.25
 ALONG = 0  # of the unknowns: the place along the entry direction, which is held
 SNAPS = 3.0
@@ -230,7 +228,8 @@ def estimated_clamp(seen: Sequence[TracedFrame], given: Clamp, prior: Prior, rep
     found = moved(given, at[:5])
     found = replace(found, covariance=_in_space(given, last.covariance[:5, :5]))
     contradiction = departed(given, found, prior.sigma_mm, prior.direction_sigma_deg)
-    told = _told(given, found, [chosen[i].index for i in last.out], last.used, contradiction)
+    left = left_out({frame.index: frame.curve for frame in chosen}, [chosen[i].index for i in last.out], last.used)
+    told = clamp_told(given, found, left, last.used, contradiction)
     rough = rougher(last.rough_mm, fit.traces, voxel_mm)
     return replace(told, warning="; ".join(filter(None, (told.warning, rough))))
 
@@ -241,44 +240,3 @@ def _in_space(clamp: Clamp, covariance: Array) -> Array:
     turn = np.zeros((6, 5))
     turn[:3, :3], turn[3:, 3:] = axes.T, axes[1:].T
     return np.asarray(turn @ covariance @ turn.T)
-
-
-def _told(given: Clamp, found: Clamp, out: Sequence[int], used: int, contradiction: str) -> Clamp:
-    """The clamp that was found with a note; the given one with a warning where it lies too far off.
-
-    contradiction : see ``departures.departed``.
-    """
-    shift, turned = float(np.linalg.norm(found.entry_mm - given.entry_mm)), angle_deg(found.direction, given.direction)
-    offset = f"{shift:.2f} mm and {turned:.1f} degrees from the manifest's"
-    if shift > FARTHEST_MM or turned > LARGEST_TURN_DEG:
-        warning = (
-            f"the simulated wire fits the first {REACH_MM:g} mm of the traces from a clamp {offset} (accepted: "
-            f"{FARTHEST_MM} mm and {LARGEST_TURN_DEG} degrees): the manifest's entry was kept. Check entry_mm and "
-            "entry_direction, and where these are right roll, material_axis and the wire's tip and stiffness; the "
-            f"clamp is entry_mm = {found.entry_mm.round(2).tolist()}, "
-            f"entry_direction = {found.direction.round(4).tolist()}"
-        )
-        return replace(given, warning=warning)
-    if not used:
-        return replace(found, warning="no frame tells where the wire is held: the manifest's entry was kept")
-    frames = f"{used} frame{'s' * (used != 1)}"
-    note = (
-        f"the clamp was estimated from {frames}: the solver's wire fitted to the first {REACH_MM:g} mm of the traces, "
-        f"weighed with the manifest's entry; {offset}, known to {found.sigma_mm:.3f} mm across the wire and "
-        f"{found.sigma_deg:.2f} degrees (one standard deviation along each axis; simulate.entry = manifest switches "
-        "this off); along the wire, where a straight wire shows nothing, it stays in the manifest's plane"
-    )
-    left = _left_out(out, used) if out else ""
-    return replace(found, note=note, warning="; ".join(filter(None, (left, contradiction))))
-
-
-def _left_out(out: Sequence[int], used: int) -> str:
-    """A warning that names the frames that were left out; where they are as many as the others, what may be wrong."""
-    what = f"the first {REACH_MM:g} mm of the traces of frame{'s' * (len(out) != 1)} {', '.join(map(str, out))}"
-    if len(out) < used:
-        return f"{what} disagree with the others: left out of the clamp"
-    return (
-        f"the simulated wire fits {what} from no clamp that also fits the other {used}: left out of it; check entry_mm "
-        "first (beyond the real clamp a wire moves from frame to frame: an entry that is stated some mm too deep fits "
-        "none of them together), then roll, material_axis and the wire's tip and stiffness, before the traces"
-    )

@@ -8,7 +8,7 @@ import numpy as np
 from pipeline.load import Header, read_header
 from pipeline.load.curves import read_truth
 from pipeline.model import Array, arc_length
-from pipeline.simulate.clamp import FARTHEST_MM, LARGEST_TURN_DEG
+from pipeline.simulate.clamp_told import FARTHEST_MM, LARGEST_TURN_DEG
 from pipeline.simulate.others import oddity
 from pipeline.study.devices import implausible, odd_catheter, odd_wall
 from pipeline.study.infer import beside

@@ -15,7 +15,8 @@ from pipeline.model import Array, Clamp, Curve
 from pipeline.run.stages.clamp import clamp_of
 from pipeline.run.stages.given import manifest_clamp
 from pipeline.simulate import together
-from pipeline.simulate.clamp import Prior, TracedFrame, _left_out, depth_from, estimated_clamp, moved
+from pipeline.simulate.clamp import Prior, TracedFrame, depth_from, estimated_clamp, moved
+from pipeline.simulate.clamp_told import left_out
 from pipeline.simulate.evidence import TraceSamples, posterior, roughness_mm
 from pipeline.simulate.way import Stop, Way
 from solver import GuideWire, Insertion, Solution
@@ -103,7 +104,8 @@ def test_one_frame_that_disagrees_is_named_and_left_out() -> None:
     bent = at_arc(curves[2].points_mm, arc) + np.column_stack([0.02 * arc**1.5, 0 * arc, 0 * arc])
     curves[2] = Curve(bent, np.full(54, 0.02), 0.01, levels={"knot_mm": 3.0})
     found = estimate(curves, off(2.0))
-    assert "frame 2 disagree" in found.warning
+    assert "traces of frame 2: left out of the clamp. Traced, they lie" in found.warning
+    assert "look at these traces first" in found.warning
     assert error_deg(found) < 0.8
 
 
@@ -225,9 +227,13 @@ def test_depth_is_counted_from_the_clamp() -> None:
 
 
 def test_traces_are_not_blamed_where_most_of_them_fit_no_clamp() -> None:
-    """A roll that was wrong was told as four of six frames that disagree with the others."""
-    assert "disagree with the others" in _left_out([3], 5)
-    most = _left_out([0, 1, 2, 3], 2)
+    """A wrong roll was told as frames that disagree with the others, whose traces agree with them to 0.03 mm."""
+    seen = dict(enumerate([trace(20.0, 0.0, np.random.default_rng(0))] * 6))
+    assert "within 0.00 mm of the others: look at the wire's tip" in left_out(seen, [3], 5)
+    points = seen[3].points_mm
+    turned = Curve(points + 0.02 * np.arange(len(points))[:, None], np.zeros(len(points)))
+    assert "mm of the others: look at these traces first" in left_out({**seen, 3: turned}, [3], 5)
+    most = left_out(seen, [0, 1, 2, 3], 2)
     assert "disagree" not in most
     assert "frames 0, 1, 2, 3" in most
     assert "check entry_mm first (beyond the real clamp a wire moves from frame to frame" in most

@@ -104,7 +104,7 @@ def test_a_given_lumen_in_pieces_is_told_where_no_wire_crosses() -> None:
     assert "in 2 pieces" in said
     assert "12.0] mm; is a slice missing" in said
     assert in_pieces(tube("C").distance, [7.0, 4.0, 4.0])
-    assert in_pieces(cut(0.0).distance, [7.0, 4.0, 4.0]) == []
+    assert in_pieces(cut(-1.0).distance, [7.0, 4.0, 4.0]) == []
     apart = cut(0.65).distance
     far = np.array(apart.values)
     far[:, :, 20:40] = 3.0
