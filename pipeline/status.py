@@ -13,8 +13,8 @@ class FrameStatus(Enum):
     ROLL_FITTED = "the roll of the insertion was fitted on this frame, so that it is not scored"
     LOAD_FAILED = "the scan could not be read; the message names the file and the reason"
     REPEATED = (
-        "the scan is that of an earlier frame, or one that was calibrated with, and a scan counts once; take one of "
-        "the two out of the case"
+        "the same scan is an earlier frame, or was calibrated with; a scan counts once: take one of the two out of the "
+        "case"
     )
     SEGMENT_FAILED = "no lumen could be segmented; the message has the reason"
     NO_WIRE = "no wire was found in this frame; check that the scan shows one and that entry_mm lies on it"
@@ -22,8 +22,8 @@ class FrameStatus(Enum):
     TRACE_LEFT_LUMEN = "the traced curve leaves the lumen; check the lumen, the registration and trace settings"
     TRACE_AMBIGUOUS = "the wire can be followed in more than one way here; look at the picture before using it"
     TRACE_LOW_CONTRAST = (
-        "nothing at the entry stands out of the noise enough to be called the wire: entry_mm is not on it, or the "
-        "frame shows none or too faintly; check both, then list a frame of a smaller depth before it, or scan with "
+        "nothing at the entry stands out of the noise enough to be called the wire; check that entry_mm lies on it and "
+        "that the frame shows one, and not too faintly; then list a frame of a smaller depth before it, or scan with "
         "more dose"
     )
     TRACE_LEFT_SCAN = "the wire runs out of the scan: its tip, or a part before it, is not in this frame"
@@ -40,8 +40,8 @@ class FrameStatus(Enum):
         "set a shorter solver.segment_mm, or auto"
     )
     SELF_CONTACT = (
-        "the simulated wire passes through itself; parts of the wire do not push each other in this model, so that "
-        "shape and force are not to be trusted from here on"
+        "the simulated wire passes through itself, as its parts do not push each other in this model; do not trust its "
+        "shape and force from here on"
     )
     CURVE_MISSING = "the other simulator has no wire for this frame, which counts as one that it failed in"
     CURVE_UNUSABLE = "the other simulator's wire cannot be used; the message names the file and the reason"

@@ -61,13 +61,13 @@ def _words(text: str) -> str:
 class Verdict:
     """What became of a second run against a first one.
 
-    runs : the two folders.     differs : rows (what, before, after) of where they come from; pooled : rows (column,
-    before, after) of overall.csv.     paired : the sentence on the ratio of their errors with its interval.
-    judged : worse where that closes the gate, holds, or withheld where there are too few insertions to tell.
-    caveat : what the last line has to add, as that the two were not measured alike.
-    alike : the sentence that nothing differs in where they come from; empty where something does.
-    warned : rows (case, warning) of what the second run alone is warned of.     void : why the second run's errors are
-    none that could be judged; empty where they are.
+    runs : the two folders.     differs : rows (what, before, after) of where they come from.     pooled : rows
+    (column, before, after) of overall.csv.     paired : a sentence on the ratio of their errors, with its interval.
+    judged : worse (the ratio closes the gate), holds (it does not), or withheld (too few insertions to tell).
+    caveat : what the last line has to add, for instance that the two were not measured alike.
+    alike : a sentence that they come from the same; empty where something differs.
+    warned : rows (case, warning) of what the second run alone is warned of.     void : why the errors of the second
+    run cannot be judged; empty where they can.
     """
 
     runs: tuple[Path, Path]

@@ -10,9 +10,9 @@ class BudgetConfig:
     """The uncertainty budget."""
 
     members: Count = 0
-    """Insertions whose inputs are drawn from what they may be; 0: no budget. 200 of them take as long as segmenting and
-    tracing ten frames of 256³."""
+    """Insertions whose inputs are drawn from what they may be. 200 of them take as long as segmenting and tracing ten
+    frames of 256³. 0: no budget."""
     members_alone: Count = 32
-    """So many for each input by itself, the same draws, for the table by source; 0: no table."""
+    """The same for each input by itself, with the same draws, for the table by source. 0: no table."""
     seed: Count = 0
-    """Of the draws."""
+    """Seed of the draws."""

@@ -18,4 +18,4 @@ class CompareConfig:
     """Length of wire behind the entry that no score counts, since the clamp was fitted there."""
     simulated_nulls: bool = True
     """Whether simulators without the roll and without the tip's curve are among the predictors, and entries.csv is
-    written: 17 more insertions."""
+    written. That takes 17 more insertions."""

@@ -15,4 +15,4 @@ class LoadConfig:
     resample: bool = False
     """Resample a tilted or irregularly spaced series onto a regular grid instead of refusing it."""
     most_gib: Annotated[float, Field(gt=0, le=1024, allow_inf_nan=False), Number] = 8.0
-    """Largest volume (GiB of voxels) that is read; a larger one is refused before a byte of it is."""
+    """Largest volume (GiB of voxels) that is read. A larger one is refused before a byte of it is read."""

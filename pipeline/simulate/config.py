@@ -30,7 +30,7 @@ class SolverConfig:
     method: Annotated[str, AfterValidator(_known), Field(json_schema_extra={"enum": [*METHODS]})] = "newton"
     """newton, or the closed_form of Alderliesten et al. (MICCAI 2002)."""
     segment_mm: Segment = "auto"
-    """Length of the wire's rigid segments; auto halves it until that changes nothing."""
+    """Length of the wire's rigid segments. auto halves it until that changes nothing."""
     hull: Annotated[str, Field(pattern=rf"^(offset|samples:{SAMPLES})$", json_schema_extra=HULLS)] = "offset"
     """offset (the hull's deepest point) or samples:N (the mean of N points, a softer wall for the same stiffness)."""
     tolerance: Annotated[float, Field(gt=0, lt=1), Number] = 1e-9
@@ -38,9 +38,9 @@ class SolverConfig:
     max_iterations: PositiveCount = 200
     """Iterations allowed for one relaxation."""
     step_mm: Step = 1.0
-    """Longest insertion step; shortened where the scene asks for it, with friction on the wall to 0.1 mm."""
+    """Longest insertion step. It is shortened where the scene asks for it; with friction on the wall, to 0.1 mm."""
     finest_mm: Step = 0.05
-    """Steps in which the wire gives way are taken again, down to this length; step_mm or more: never."""
+    """Steps in which the wire gives way are taken again, down to this length. With step_mm or more they never are."""
     initial: Literal["slide", "translate"] = "slide"
     """slide or translate: how the wire is moved before it relaxes."""
 
@@ -54,14 +54,14 @@ class SimulateConfig:
     entry: Literal["traced", "manifest"] = "traced"
     """traced (fitted to the first 10 mm of the traces, weighed with the manifest) or manifest (taken as written)."""
     bending_scale: Factor = 1.0
-    """Factor on the wire's bending stiffness, for sensitivity runs; the same for the whole wire, it scales forces."""
+    """Factor on the wire's bending stiffness, for sensitivity runs. The whole wire has one factor: it scales forces."""
     taper_scale: Factor = 1.0
     """Factor on the lengths over which the wire's bending stiffness changes, for sensitivity runs."""
     rest_curvature_scale: NonNegative = 1.0
-    """Factor on the wire's rest curvature, for sensitivity runs; 0 takes the curve off its tip."""
+    """Factor on the wire's rest curvature, for sensitivity runs. 0 takes the curve off its tip."""
     friction: Friction | None = None
     """Coulomb's coefficient instead of the manifest's, for sensitivity runs."""
     wall_scale: Factor = 1.0
     """Factor on the wall stiffness, for sensitivity runs."""
     roll_offset_deg: Turn = 0.0
-    """Added to the roll of every frame, for sensitivity runs."""
+    """Degrees added to the roll of every frame, for sensitivity runs."""

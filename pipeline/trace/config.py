@@ -19,13 +19,13 @@ class TraceConfig:
     length_tolerance_mm: NonNegative = 2.0
     """Largest accepted disagreement between the traced length and the manifest's insertion_mm."""
     ridge_voxels: Annotated[float, Field(ge=0.3, le=5), Number] = 0.7
-    """Blur (voxels) in which crests are looked for; widened by itself where contrast is low."""
+    """Blur (voxels) in which crests are looked for. It widens by itself where contrast is low."""
     longest_gap_mm: Millimetres = 5.0
     """Longest gap between two pieces of wire that is bridged."""
     rotation_axis: Axis | tuple[()] = ()
-    """Axis (LPS) about which the scanner turned; empty: the scan's third axis, as rotational scans are stored."""
+    """Axis (LPS) about which the scanner turned. Empty: the scan's third axis, as rotational scans are stored."""
     in_plane_deg: Annotated[float, Field(ge=0, le=90), Number] = 10.0
-    """Points whose tangent is nearer than this to the plane of rotation are flagged: the cone's half angle."""
+    """The cone's half angle: points whose tangent is nearer than this to the plane of rotation are flagged."""
     register: Literal["auto", "off"] = "auto"
     """auto (frames are registered to the reference scan where the phantom moved) or off."""
     register_skip_voxels: NonNegative = 0.1

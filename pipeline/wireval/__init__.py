@@ -122,10 +122,10 @@ def score(
     fail_if: str | Sequence[str] = (),
     **more: bool | int | str | Settings,
 ) -> Results:
-    """Compare the wires of other simulators with the traced ones; the results of the first simulator.
+    """Compare the wires of other simulators with the traced ones, and return the results of the first simulator.
 
     curves : ``"mine=DIR"``, several of these, or ``{"mine": DIR, ...}``.     fail_if : as for ``run``, asked of every
-    simulator, or of the one that is named (``"mine:rms_mm>0.5"``); those that hold are in ``results.closed``.
+    simulator, or of the one that is named (``"mine:rms_mm>0.5"``). Those that hold are in ``results.closed``.
     more : options of ``wireval score``.
     For the results of another simulator: ``read_results(out / "simulators" / NAME)``.
     """
@@ -137,16 +137,20 @@ def score(
 
 
 def calibrate(manifest: Place, out: Place, **more: bool | Settings) -> Path:
-    """Fit parameters to the cases of role calibration; the file that ``run`` takes. more : as for ``score``."""
+    """Fit parameters to the cases of role calibration, and return the file with them, which ``run`` takes.
+
+    more : options of ``wireval calibrate``.
+    """
     _carried_out("calibrate", manifest, out=out, **more)
     return Path(out) / "parameters.toml"
 
 
 def diff(first: Place, second: Place, *, tolerance: Place | None = None) -> Verdict:
-    """Whether a second run (or score) is worse than a first one; InputError where they cannot be compared.
+    """Tell whether a second run (or score) is worse than a first one.
 
-    tolerance : a TOML file with how much worse each column may become, ``rms_mm = 0.03``; by default the one that is
-    installed with wireval.
+    tolerance : a TOML file that says how much worse each column may become, such as ``rms_mm = 0.03``. By default it is
+    the one that is installed with wireval.
+    Raises InputError where the two cannot be compared.
     """
     try:
         return compared(Path(first), Path(second), None if tolerance is None else Path(tolerance))

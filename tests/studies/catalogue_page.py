@@ -27,11 +27,16 @@ BRIGHT = 2200.0  # grey value drawn white: a little more than twice the contrast
 RED = (220, 40, 40)
 HEAD = """# The catalogue of synthetic scenes
 
-`wireval synth NAME -o DIR` writes any of them as files with truth; `wireval synth --list` names them. Pictures: the
-brightest voxel along one axis of one frame at 0.5 or 0.6 mm (seed {seed}), the true wire in red. Expected: the status
-in which every frame ends, checked by the test suite ({frames} frames a scene); its errors are held against
-`reports/baseline/catalogue`. A frame without wire ends in `trace_low_contrast`, not `no_wire`: in noise something
-thin is always found, and refused for being too faint. This page is written by `python -m tests.studies.catalogue_page`.
+`wireval synth NAME -o DIR` writes any of them as files with truth. `wireval synth --list` names them.
+
+- **Expected** is the status in which every frame ends. The test suite checks it ({frames} frames a scene), and holds
+  the errors against `reports/baseline/catalogue`.
+- **Pictures** show the brightest voxel along one axis of one frame at 0.5 or 0.6 mm (seed {seed}), with the true wire
+  in red.
+- **A frame without wire** ends in `trace_low_contrast`, not `no_wire`. In noise something thin is always found, and
+  refused for being too faint.
+
+This page is written by `python -m tests.studies.catalogue_page`.
 
 """
 

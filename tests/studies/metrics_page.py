@@ -10,9 +10,11 @@ from reports.schema import ERRORS, POOLED, Column
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "metrics.md"
 HEAD = """# What is measured of a frame
 
-w are points of the simulated wire, c of the traced curve, both at equal steps (`compare.sample_mm`) of the arc length s
-from the entry, and at the tip. A case pools over its frames that are ok, and so does overall.csv over all validation
-cases. This page is written by `python -m tests.studies.metrics_page` from reports/columns.toml.
+In the formulas w are points of the simulated wire, and c points of the traced curve. Both lie at equal steps
+(`compare.sample_mm`) of the arc length s from the entry, and at the tip. A case pools over its frames that are ok.
+overall.csv does so over all validation cases.
+
+This page is written by `python -m tests.studies.metrics_page` from reports/columns.toml.
 
 | column | unit | what | how | of a case |
 |---|---|---|---|---|

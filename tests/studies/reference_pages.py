@@ -30,44 +30,47 @@ NOTE = "*Written by `make pages` from the code; do not edit.*\n"
 KEYS = {
     "id": "Name of the case and of its folder in OUT.",
     "role": "What the case is for: a calibration case counts in no score.",
-    "assumed": "What nobody has confirmed yet, a sentence each; `init` writes them, `check` and the pages repeat them.",
+    "assumed": "What nobody has confirmed yet, a sentence each. `init` writes them; `check` and the pages repeat them.",
     "group": "Insertions of one group are one unit of the intervals. Default: the case itself.",
-    "phantom": "A name: insertions into one phantom, in the same coordinates, are guesses for each other "
-    "(null_another_rms_mm). Default: what has the same lumen, or a reference of the same voxels in the same place.",
+    "phantom": "A name. Insertions into one phantom, in the same coordinates, are guesses for each other "
+    "(null_another_rms_mm). Default: one phantom is what has the same lumen, or a reference of the same voxels in the "
+    "same place.",
     "reference": "Scan without the wire. Without it the lumen is segmented from the first frame.",
-    "frames": "With the wire: a pattern in natural order, or a list; files, DICOM folders, `study.h5#/frames`.",
+    "frames": "Scans with the wire: a pattern in natural order, or a list. Files, DICOM folders, `study.h5#/frames`.",
     "entry_mm": "Where the wire enters the lumen, LPS mm.",
     "entry_direction": "Where the wire points at the entry.",
     "entry": 'Take the clamp from another insertion of the same fixation: `"case:ID"`.',
-    "entry_sigma_mm": "How well entry_mm is known; 0 is exact. Default: half a voxel. Along the wire only this tells.",
+    "entry_sigma_mm": "How well entry_mm is known; 0 is exact. Default: half a voxel. Along the wire nothing "
+    "else tells of the place.",
     "entry_direction_sigma_deg": "How well entry_direction is known; 0 is exact.",
     "material_axis": "Where material axis 1 points at roll 0. Default: the world axis least along the direction.",
     "wire": "Name of one of `[wires.*]`.",
-    "insertion_mm": "Expected depths, one per frame, held against the traces. Without frames: depths to simulate.",
-    "spacing_mm": "Voxel size, for files that lack it; reported as assumed.",
-    "lumen": "Own lumen instead of a segmented one: label map, .stl, .vtp, or centreline with radii (.swc, .mrk.json); "
-    '`{file = "seg.nrrd", label = 2}` takes one label, by number or name, `{file = ..., level = 0.5}` a probability.',
+    "insertion_mm": "Expected depths, one per frame; traces are held against them. Without frames: depths to simulate.",
+    "spacing_mm": "Voxel size, for files that lack it. It is reported as assumed.",
+    "lumen": "Own lumen instead of a segmented one: label map, .stl, .vtp, or centreline with radii (.swc, .mrk.json). "
+    '`{file = "seg.nrrd", label = 2}` takes one label, by number or name. '
+    "`{file = ..., level = 0.5}` takes a probability.",
     "traces": "Own or corrected centrelines instead of traced ones, one file per frame: .csv (x_mm, y_mm, z_mm, LPS "
     "unless a line says # space: RAS or # unit: m), .vtp, 3D Slicer's .mrk.json.",
     "parameters": "What `wireval calibrate` wrote.",
-    "roll_deg": 'Roll about entry_direction, right-handed: one number, one per frame, or `"fit"`: on the first frame, '
-    "which is not scored.",
+    "roll_deg": 'Roll about entry_direction, right-handed: one number, one per frame, or `"fit"`. That fits it on the '
+    "first frame, which is then not scored.",
     "push_force_N": "Measured push force, one per frame.",
     "push_force_sigma_N": "Standard deviation of the measured push force.",
-    "roll_sigma_deg": "How well the roll is known, by the budget and where `calibrate` learns. Default: 5 degrees.",
-    "insertion_sigma_mm": "How well the depth is known.",
+    "roll_sigma_deg": "How well the roll is known. The budget and `calibrate` use it. Default: 5 degrees.",
+    "insertion_sigma_mm": "Standard deviation of the depth.",
     "simulated": "Another simulator's wires instead of simulated ones, one file per frame; or "
     '`{files = ..., space = "RAS", unit = "mm"}` where the files do not state them.',
     "files": "The files, as `simulated` alone names them.",
     "space": "LPS or RAS, where the files do not state it.",
     "unit": "mm, cm or m, where the files do not state it.",
     "uncertainty": "How well other inputs are known, below: what the budget draws from.",
-    "lumen_mm": "Of the lumen's surface, from place to place.",
-    "lumen_bias_mm": "Of the lumen's surface, common to all of it.",
-    "rest_curvature": "Of the rest curvature, relative.",
-    "taper": "Of the lengths over which the stiffness changes, of their logarithm.",
-    "wall_stiffness": "Of the wall's stiffness, of its logarithm.",
-    "friction of Uncertainty": "Of the coefficient of friction.",
+    "lumen_mm": "Standard deviation of the lumen's surface, from place to place, mm.",
+    "lumen_bias_mm": "The same, common to all of the surface, mm.",
+    "rest_curvature": "Standard deviation of the rest curvature, relative.",
+    "taper": "Standard deviation of the logarithm of the lengths over which the stiffness changes.",
+    "wall_stiffness": "Standard deviation of the logarithm of the wall's stiffness.",
+    "friction of Uncertainty": "Standard deviation of the coefficient of friction.",
     "projections": "Two-dimensional views instead of frames.",
     "lumen_seed_mm": "Points in the lumen, LPS mm. Default: the entry.",
     "truth": "True wires of a synthetic study, one for each frame, LPS mm, from the entry to the tip: JSON, "
@@ -80,7 +83,7 @@ KEYS = {
     "rest_curvature_per_mm": "Curvature of the wire when nothing touches it, towards material axis 1 where positive.",
     "torsional_stiffness_N_mm2": "GJ. Default: inf, the tip turns with the hand.",
     "weight_N_per_mm": "Weight per length; needs `down`.",
-    "opacity": "Brightness per length in X-rays, over the distance from the tip, in any unit: "
+    "opacity": "Brightness per length in X-rays, in any unit, over the distance from the tip: "
     "`[[0, 3.0], [20, 3.0], [20, 1.0]]` for a coil of platinum. Left out: found in the scans.",
     "stiffness_N_mm2": "Force per mm of wire and mm of way into the wall.",
     "friction": "Coulomb's coefficient.",
@@ -100,9 +103,13 @@ def settings() -> str:
     parts = [
         "# Settings\n",
         NOTE,
-        "`--set table.key=value` for one, `-c FILE.toml` for many, `wireval settings > FILE.toml` for a file of all;\n"
-        "the command line wins over a file, a file over the default. `config.resolved.toml` in OUT says what\n"
-        "was in force and where it came from. *Left out* means: taken from the data or the manifest.\n",
+        "| to | do |\n| --- | --- |\n"
+        "| set one | `--set table.key=value` |\n"
+        "| set many | `-c FILE.toml` |\n"
+        "| get a file of all | `wireval settings > FILE.toml` |\n"
+        "| see what was in force and where it came from | `config.resolved.toml` in OUT |\n\n"
+        "The command line wins over a file, and a file over the default. *Left out* means: taken from the data or\n"
+        "the manifest.\n",
     ]
     for group in groups:
         rows = [(f"`{s.key}`", s.meaning, s.allowed, s.value or "left out") for s in described() if s.table == group]
@@ -150,11 +157,13 @@ def manifest() -> str:
     parts = [
         "# The manifest\n",
         NOTE,
-        "TOML; paths are relative to the file and stay below its folder: one that leads out of it (`../scans`) is\n"
-        "refused, so that it is plain what a manifest reads elsewhere; write such a path as an absolute one. An\n"
-        "unknown key is an error that names the nearest known one. `wireval init FOLDER` writes one from a folder of\n"
-        "scans, `wireval check FILE` lists every problem at once. For editors:\n"
-        "[manifest.schema.json](../schema/manifest.schema.json) (in the first line: `#:schema PATH`).\n",
+        "A manifest is TOML. `wireval init FOLDER` writes one from a folder of scans, and `wireval check FILE` lists\n"
+        "every problem at once.\n\n"
+        "- **Paths** are relative to the file and stay below its folder. One that leads out of it (`../scans`) is\n"
+        "  refused. Write such a path as an absolute one, so that it is plain what a manifest reads elsewhere.\n"
+        "- **An unknown key** is an error that names the nearest known one.\n"
+        "- **Editors** take [manifest.schema.json](../schema/manifest.schema.json) (in the first line:\n"
+        "  `#:schema PATH`).\n",
     ]
     names = {"Wire": "[wires.NAME]", "Case": "[[case]]", "Wall": "[case.wall]", "OverWire": "[case.catheter]"}
     names |= {"Uncertainty": "[case.uncertainty]", "Others": "[case.simulated]"}
@@ -174,9 +183,9 @@ def columns() -> str:
     parts = [
         "# Columns\n",
         NOTE,
-        "A name carries its unit (`_mm`, `_deg`, `_N`, `_s`); what does not apply is an empty field, never 0.\n"
-        "[How the errors of a frame are computed](../metrics.md), formula by formula. overall.csv has the columns of\n"
-        "summary.csv.\n",
+        "A name carries its unit (`_mm`, `_deg`, `_N`, `_s`). What does not apply is an empty field, never 0.\n"
+        "overall.csv has the columns of summary.csv. Another page tells [how the errors of a frame are\n"
+        "computed](../metrics.md), formula by formula.\n",
     ]
     for one in (value for value in vars(schema).values() if isinstance(value, Table)):
         rows = [(f"`{column.name}`", column.unit, column.kind, column.meaning) for column in one]
@@ -193,7 +202,7 @@ def statuses() -> str:
     for title, pairs in (
         ("Of a frame", [(one.identifier, one.value) for one in FrameStatus]),
         (
-            "Of a simulated wire, where it is not at rest: the frame's status, too",
+            "Of a simulated wire that is not at rest (the frame has this status, too)",
             [(s.identifier, s.value) for s in Status],
         ),
         ("Of a case without a result", [*LOST.items()]),
