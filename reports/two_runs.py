@@ -142,5 +142,5 @@ class Verdict:
         verdict = f"Verdict: {self.word.upper()}.{closed}{alone if self.judged != 'worse' else ''}{pooled}\n"
         parts.insert(1 if self.differs else 0, verdict)
         parts[:0] = [f"{self.alike[0].upper()}{self.alike[1:]}.\n"] if self.alike else []
-        gate = "exit 1, the gate closes" if self.closed else "exit 0, the gate stays open"
+        gate = "FAIL, exit 1, the gate closes" if self.closed else "PASS, exit 0, the gate stays open"
         return [*parts, f"{self.sentence}: {gate}"]

@@ -89,7 +89,7 @@ def _run(args: argparse.Namespace, gates: "Sequence[Gate]") -> int:
         write_tests(args.junit, {"": found_results(plan.out)}, totals.gates)
     _tell(plan, totals)
     for line in () if plan.template.quiet else totals.opened:
-        say(line)
+        say(f"PASS: {line}")
     say(last_line(totals, index))
     return 0 if totals.all_ok and not totals.closed else 1
 
@@ -125,7 +125,7 @@ def _tell(plan: "Plan", totals: "Totals") -> None:
     from reports.verdict import remarks
     from reports.what_next import warned
 
-    sys.stderr.writelines(f"{line}\n" for line in (*failure_lines(plan), *totals.closed))
+    sys.stderr.writelines(f"{line}\n" for line in (*failure_lines(plan), *(f"FAIL: {why}" for why in totals.closed)))
     aside(warned(plan.out), quiet=plan.template.quiet)
     for text in remarks(totals.pooled):
         say(f"warning: {text}")

@@ -25,7 +25,7 @@ from reports.doubts import AMONG, copied_from_traces, doubted, warnings_in
 from reports.gates import GATES, asked_of
 from reports.junit import Outcome, write_junit
 from reports.origin import why_not_pooled
-from reports.schema import FAILURES, OVERALL_FILE, SUMMARY, TIMINGS
+from reports.schema import ERRORS, FAILURES, OVERALL_FILE, SUMMARY, TIMINGS
 from reports.verdict import remarks, unscored
 
 
@@ -104,7 +104,7 @@ def aggregate(out: Path, run_info: dict[str, Any] | None = None, name: str = "ru
         whole,
         mixed or unscored((result.role, result.status) for result in found) or not_reached(out),
         bool(mixed),
-        *_judged(out, asked_of(out) if run_info is None else run_info.get("fail_if", ()), whole),
+        *_judged(out, asked_of(out) if run_info is None else run_info.get("fail_if", ()), whole, validation(among)),
         frames_fitted=sum(row.get("frames_fitted") or 0 for row in rows),
     )
 
@@ -123,10 +123,13 @@ def _keep_what_is_seen(out: Path, found: Sequence[Result], among: Sequence[Found
         write_json(out / AMONG, {"assumptions": assumed, "doubts": doubts})
 
 
-def _judged(out: Path, asked: Sequence[str], overall: Mapping[str, Any]) -> tuple[dict[str, str], list[str]]:
+def _judged(
+    out: Path, asked: Sequence[str], overall: Mapping[str, Any], scored: Sequence[Found]
+) -> tuple[dict[str, str], list[str]]:
     """By each condition why a run must not pass, empty where it may, and what is said of those; also for its page.
 
     Errors of wires that were made from the traces open no gate. overall : the row of the run into ``out``.
+    scored : its cases.
     """
     (out / GATES).unlink(missing_ok=True)
     if not asked:
@@ -140,9 +143,27 @@ def _judged(out: Path, asked: Sequence[str], overall: Mapping[str, Any]) -> tupl
             told[f"--fail-if {text}"] = f"{CLOSED}: --fail-if {text}: {OVERALL_FILE} of this version has no such number"
             continue
         told[one.asked] = why = f"{CLOSED}: {one.asked}: {copied}" if copied else one.closed(overall)
+        if why and not copied and pd.notna(overall.get(one.column)):
+            told[one.asked] += _worst(scored, one.column)
         opened += [] if why else [one.open(overall)]
     write_json(out / GATES, {"closed": [why for why in told.values() if why], "open": opened})
     return told, opened
+
+
+def _worst(scored: Sequence[Found], column: str) -> str:
+    """Which frame is the worst by a column of overall.csv, and its page; empty for what no frame has."""
+    name = column.replace("_median", "")
+    if name not in ERRORS.names or not ERRORS[name].better:
+        return ""
+    sign = -1.0 if ERRORS[name].better == "high" else 1.0
+    of_all: list[tuple[str, int, Any]] = [
+        (case.result.case, n, frame.row.get(name)) for case in scored for n, frame in case.frames.items()
+    ]
+    known = [(case, n, float(value)) for case, n, value in of_all if pd.notna(value)]
+    if not known:
+        return ""
+    case, frame, value = max(known, key=lambda row: sign * row[2])
+    return f"; the worst: case {case} frame {frame} ({name} {value:.4g}), cases/{case}/report.html"
 
 
 def _times(out: Path, found: Sequence[Result]) -> tuple[pd.DataFrame, float]:

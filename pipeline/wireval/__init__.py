@@ -145,8 +145,8 @@ def calibrate(manifest: Place, out: Place, **more: bool | Settings) -> Path:
 def diff(first: Place, second: Place, *, tolerance: Place | None = None) -> Verdict:
     """Whether a second run (or score) is worse than a first one; InputError where they cannot be compared.
 
-    tolerance : a TOML file with how much worse each column may become, ``rms_mm = 0.03``; by default the one that is
-    installed with wireval.
+    tolerance : a TOML file with how much worse each column may become, ``rms_mm = 0.03``, and in its table ``share``
+    by which share of the first value, where that is more; by default the one that is installed with wireval.
     """
     try:
         return compared(Path(first), Path(second), None if tolerance is None else Path(tolerance))

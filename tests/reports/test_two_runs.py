@@ -70,6 +70,7 @@ def test_the_same_twice_is_not_worse(first: Path, capsys: pytest.CaptureFixture[
     assert said.splitlines()[0] == "Nothing differs in settings, code and inputs."
     assert "the error of no validation frame changed" in said
     assert said.splitlines()[-1].startswith("not worse")
+    assert said.endswith(": PASS, exit 0, the gate stays open\n")
 
 
 def test_what_is_not_known_to_be_the_same_is_not_called_so(first: Path, second: Path, tmp_path: Path) -> None:
@@ -144,7 +145,7 @@ def test_the_verdict_follows_what_differs_and_ends_the_text(
     assert said.splitlines()[-1].startswith(
         "WORSE: 3 cases compared: 2 of 9 frames worse; the worst: case b frame 2, tip_mm"
     )
-    assert said.endswith("exit 1, the gate closes\n")
+    assert said.endswith(": FAIL, exit 1, the gate closes\n")
     (verdict,) = [line for line in said.splitlines() if line.startswith("Verdict:")]
     assert re.search(
         r"closes the gate, the worst first: case b frame 2, tip_mm \S+ -> \S+ \(allowed 0.1\)\. Pooled", verdict
@@ -587,3 +588,16 @@ def test_wires_that_were_made_from_the_traces_pass_no_gate(
     times(second, 3.0)
     assert main(["diff", str(first), str(second)]) == 1
     assert "Verdict: WORSE" in capsys.readouterr().out
+
+
+def test_a_quiet_report_prints_the_result_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """All other verbs that take long had -q, and a script had to know which does not."""
+    monkeypatch.setattr("pipeline.run.case.draw", lambda *_: None)
+    out = write_run(tmp_path / "out", tuple(FakeCase(f"c{n}", frames=1, seed=n) for n in range(10)))
+    assert main(["report", str(out)]) == 0
+    assert capsys.readouterr().err.count(": drawn\n") == 10
+    assert main(["report", str(out), "-q"]) == 0
+    heard = capsys.readouterr()
+    assert (heard.err, heard.out.count("\n")) == ("", 1)
