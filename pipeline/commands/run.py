@@ -68,7 +68,6 @@ def _run(args: argparse.Namespace, gates: "Sequence[Gate]") -> int:
     from pipeline.run.batch import require_cluster
     from pipeline.run.last_words import last_line
     from pipeline.run.launch import intention, launch
-    from pipeline.run.results import found_results
     from pipeline.study.plausible import doubts
 
     plan = _plan(args)
@@ -86,7 +85,7 @@ def _run(args: argparse.Namespace, gates: "Sequence[Gate]") -> int:
     require_cluster(plan.address)  # before OUT is claimed
     totals, index = launch(plan)
     if args.junit:
-        write_tests(args.junit, {"": found_results(plan.out)}, totals.gates)
+        write_tests(args.junit, {"": plan.out}, totals.gates)
     _tell(plan, totals)
     for line in () if plan.template.quiet else totals.opened:
         say(f"PASS: {line}")

@@ -94,14 +94,13 @@ def _lost(curves: Sequence[str], cases: Sequence[str]) -> Iterator[str]:
 def _write_junit(path: Path, plans: "Mapping[str, Plan]", totals: "Mapping[str, Totals]") -> None:
     """The frames of all simulators, and the gates of each."""
     from pipeline.run.aggregate import write_tests
-    from pipeline.run.results import found_results
 
     gates = {
         f"{name}: {asked}": f"{name}: {why}" * bool(why)
         for name, one in totals.items()
         for asked, why in one.gates.items()
     }
-    write_tests(path, {f"{name}/": found_results(plan.out) for name, plan in plans.items()}, gates)
+    write_tests(path, {f"{name}/": plan.out for name, plan in plans.items()}, gates)
 
 
 def _judged(plans: "Mapping[str, Plan]", quiet: bool) -> "dict[str, Totals]":

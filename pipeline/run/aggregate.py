@@ -17,7 +17,7 @@ from pipeline.run.exchanged import exchanged
 from pipeline.run.gate import CLOSED, parsed
 from pipeline.run.kin import told_of_kin
 from pipeline.run.overall import Found, found_cases, frames_of, overall, shared_scans, strangers, validation
-from pipeline.run.results import Result, write_json
+from pipeline.run.results import Result, found_results, write_json
 from pipeline.status import UsageError
 from reports import tables
 from reports.case_files import GOOD, not_reached
@@ -180,19 +180,30 @@ def _times(out: Path, found: Sequence[Result]) -> tuple[pd.DataFrame, float]:
     return pd.concat(parts, ignore_index=True) if parts else tables.read_if_there(None, TIMINGS), replayed_s
 
 
-def write_tests(path: Path, found: Mapping[str, Sequence[Result]], gates: Mapping[str, str]) -> None:
+def write_tests(path: Path, folders: Mapping[str, Path], gates: Mapping[str, str]) -> None:
     """Write a JUnit summary: a suite per case, a test per frame (one test for a case without frames), a suite of gates.
 
-    found : the cases by what their suites' names begin with.     gates : as in ``Totals``.
+    folders : outputs by what the names of their cases' suites begin with.     gates : as in ``Totals``.
     """
-    suites = [
-        (f"{whose}{result.case}", [_outcome(frame) for frame in result.frames or [_whole(result)]])
-        for whose, results in found.items()
-        for result in results
-    ]
+    suites = []
+    for whose, out in folders.items():
+        for result in found_results(out):
+            seconds = _seconds(out / "cases" / result.case / TIMINGS.file)
+            frames = [_outcome(frame, seconds) for frame in result.frames or [_whole(result)]]
+            suites.append((f"{whose}{result.case}", frames))
     if gates:
         suites.append(("gates", [Outcome(n, "failed" if why else "passed", why, "gate") for n, why in gates.items()]))
     write_junit(path, "wireval", suites)
+
+
+def _seconds(path: Path) -> dict[Any, float]:
+    """Seconds of a case's frames by their numbers, in all stages that are known by frame; of the whole under "case"."""
+    with suppress(OSError, ValueError):
+        table = tables.read_if_there(path, TIMINGS)
+        steps = table[[name for name in TIMINGS.names if name.endswith("_s")]].fillna(0.0)
+        by_frame = steps.drop(columns="total_s").sum(axis=1).where(table["frame"].notna(), steps["total_s"])
+        return dict(zip(table["frame"].astype(object).where(table["frame"].notna(), "case"), by_frame, strict=True))
+    return {}
 
 
 def _whole(result: Result) -> dict[str, Any]:
@@ -200,8 +211,8 @@ def _whole(result: Result) -> dict[str, Any]:
     return {"frame": "case", "status": result.status, "sentence": result.sentence, "message": why}
 
 
-def _outcome(frame: Mapping[str, Any]) -> Outcome:
-    name = f"frame {frame['frame']}"
+def _outcome(frame: Mapping[str, Any], seconds: Mapping[Any, float]) -> Outcome:
+    name, took = f"frame {frame['frame']}", float(seconds.get(frame["frame"], 0.0))
     if frame["status"] in GOOD:
-        return Outcome(name)
-    return Outcome(name, "failed", frame["sentence"], frame["status"], frame["message"])
+        return Outcome(name, seconds=took)
+    return Outcome(name, "failed", frame["sentence"], frame["status"], frame["message"], took)

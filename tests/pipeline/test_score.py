@@ -194,6 +194,9 @@ def test_a_case_without_a_folder_has_failed_and_the_others_count(
     }
     suites = {suite.get("name"): suite.get("failures") for suite in ElementTree.parse(junit).getroot()}
     assert (suites["mine/bend"], suites["mine/lost"]) == ("0", str(FRAMES))
+    took = pd.read_csv(out / "cases" / "bend" / "timings.csv").set_index("frame")["compare_s"][0]
+    (first,) = ElementTree.parse(junit).findall("testsuite[@name='mine/bend']/testcase[@name='frame 0']")
+    assert float(str(first.get("time"))) == pytest.approx(took, abs=1e-3), "of a frame that is timed"
     (tmp_path / "sim" / "bend").rename(tmp_path / "sim" / "bent")
     assert main([*words, "--curves", f"mine={tmp_path / 'sim'}"]) == 2
     assert "found neither bend/ nor bend.h5 in it" in capsys.readouterr().err
