@@ -5,7 +5,7 @@ import importlib
 import re
 import signal
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import NoReturn
 
@@ -25,8 +25,13 @@ COMMAND_LINE = "the command line"
 
 
 KINDS = {"int": "a whole number", "float": "a number"}
+UNITS = {"--case-timeout": " of seconds, as 60", "--case-memory": " of MiB, as 2048"}
+"""Units of options, for who wrote one beside the number (1m, 2G)."""
 WORDED: tuple[tuple[str, Callable[[re.Match[str]], str]], ...] = (
-    (r"argument (\S+): invalid (int|float) value: (.*)", lambda m: f"{_short(m[1])} {m[3]}: expected {KINDS[m[2]]}"),
+    (
+        r"argument (\S+): invalid (int|float) value: (.*)",
+        lambda m: f"{_short(m[1])} {m[3]}: expected {KINDS[m[2]]}{UNITS.get(m[1], '')}",
+    ),
     (
         r"argument (\S+): invalid choice: ('.*?') \(choose from (.*)\)",
         lambda m: f"{_short(m[1])} {m[2]}: allowed: {m[3]}",
@@ -91,15 +96,28 @@ def parsed(words: Sequence[str]) -> argparse.Namespace:
     parser, verbs = parsers()
     if words and not words[0].startswith("-") and words[0] not in verbs:
         raise _usage(f"{words[0]!r} is no command; {did_you_mean(words[0], verbs)}")
-    args, unknown = parser.parse_known_args(words)
+    try:
+        args, unknown = parser.parse_known_args(words)
+    except InputError:  # of --curve=x it was said that --curves is missing
+        verb = words[0] if words and words[0] in verbs else ""
+        known = verbs[verb]._option_string_actions if verb else {}
+        typed = [word for word in words if word.startswith("--") and word.partition("=")[0] not in known]
+        if not verb or not typed or "--" in words:
+            raise
+        raise _unknown(typed[0].partition("=")[0], verb, known) from None
     if unknown:
         allowed = verbs[args.command]._option_string_actions if args.command else parser._option_string_actions
-        long = [name for name in allowed if name.startswith("--")]
-        hint = did_you_mean(unknown[0], long) if unknown[0].startswith("-") else "one argument too many"
-        raise _usage(f"{unknown[0]}: not an option of wireval {args.command or ''}; {hint}".replace(" ;", ";"))
+        raise _unknown(unknown[0], args.command, allowed)
     if not args.command and not args.version:
         parser.print_help()
     return args
+
+
+def _unknown(word: str, verb: str | None, allowed: Iterable[str]) -> InputError:
+    """What is said of a word that a verb does not know."""
+    long = [name for name in allowed if name.startswith("--")]
+    hint = did_you_mean(word, long) if word.startswith("-") else "one argument too many"
+    return _usage(f"{word}: not an option of wireval {verb or ''}; {hint}".replace(" ;", ";"))
 
 
 def _usage(problem: str) -> InputError:

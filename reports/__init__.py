@@ -45,8 +45,9 @@ Sentences on pages and on the terminal:
 ``what_next``        the worst frames, and the command that comes next
 ===================  ==================================================================================
 
-Two runs held against each other, the gate for continuous integration: ``diff`` compares frame by frame, ``two_runs``
-and ``two_scores`` make the verdict of it, ``two_runs_files`` and ``junit`` write it; ``tolerance`` has what is allowed.
+Two runs held against each other, the gate for continuous integration: ``diff`` compares frame by frame, ``closing``
+has what closes the gate, the worst first, ``two_runs`` and ``two_scores`` make the verdict of it, ``two_runs_files``
+and ``junit`` write it; ``tolerance`` has what is allowed.
 
 A new figure is a function in ``figures`` and an entry in ``sections.toml``; a new metric a line in ``columns.toml``.
 """

@@ -107,6 +107,18 @@ def _spread(row: dict[str, Any], key: str) -> str:
     return number(sd, 2)
 
 
+def to_its_digits(row: Mapping[str, Any], key: str) -> str:
+    """A value of a row, to the place where its standard deviation has its second digit: 1.037 +- 0.1 says too much.
+
+    The standard deviation of a factor is of its logarithm: of the factor itself it is as many times its value.
+    """
+    value, sd = float(row[key]), float(row["sd"]) * (abs(float(row[key])) if row["logarithmic"] else 1.0)
+    if not 0.0 < sd < np.inf:
+        return number(value)
+    places = min(1 - int(np.floor(np.log10(float(f"{sd:.1e}")))), 6)
+    return f"{round(value, places) + 0.0:.{max(places, 0)}f}"  # of -0.0, too
+
+
 def gained(frames: Sequence[Mapping[str, Any]]) -> str:
     """How far the wires of the fitted frames lie from their traces, as stated and as calibrated; empty without any."""
     known = pd.DataFrame(frames, columns=["depth_mm", "before_mm", "after_mm"]).astype(float).dropna()
@@ -126,9 +138,9 @@ def _row(row: dict[str, Any]) -> dict[str, Any]:
     bounds = " to ".join(number(float(v)) for v in row["bounds"])
     return {
         "parameter": row["name"],
-        "value": number(float(row["value"])),
+        "value": to_its_digits(row, "value"),
         "sd": _spread(row, "sd"),
-        "used": number(float(row["used"])),
+        "used": to_its_digits(row, "used") if row["seen"] else f"{float(row['used']):g}",
         "seen": "yes" if row["seen"] else "NO",
         "prior": f"{number(float(row['prior']))} ± {number(float(row['prior_sd']), 2)}",
         "bounds": bounds,

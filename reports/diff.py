@@ -13,15 +13,11 @@ from typing import Any
 import pandas as pd
 
 from reports.case_files import GOOD, counted, find_cases, listed
+from reports.closing import BEFORE_COMPARE, how_many, is_error, told, worst_first
 from reports.schema import ERRORS
 from reports.tables import read_if_there
-from reports.tolerance import RATIO
+from reports.tolerance import allowed_of, columns_in
 
-BEFORE_COMPARE = {
-    *("insertion_mm", "max_penetration_mm", "push_force_N", "iterations", "num_mm"),
-    *("trace_sigma_mm", "trace_mean_mm", "trace_max_mm", "trace_tip_mm"),
-}
-"""What a run has that ended before frames are compared: no number of it says how far a simulated wire is off."""
 FITTED = "roll_fitted"
 _LACKING = "in no frame"
 CLOSING = ("regression", "moved")
@@ -45,10 +41,22 @@ class Difference:
 
     @property
     def regressions(self) -> pd.DataFrame:
-        """The rows that became worse, the worst first: what is missing, then by change over allowed change."""
-        rows = self.rows[self.rows["verdict"] == "regression"]
-        times = (rows["change"].abs() / rows["allowed"]).fillna(math.inf)
-        return rows.loc[times.sort_values(ascending=False, kind="stable").index]
+        """The rows that became worse, the worst first: what is missing, errors, then other columns."""
+        return worst_first(self.rows[self.rows["verdict"] == "regression"])
+
+    @property
+    def beside_errors(self) -> bool:
+        """Whether something became worse, and no error of a simulated wire did, nor went anything missing."""
+        rows = self.regressions
+        return bool(len(rows)) and not (rows["change"].isna() | rows["column"].map(is_error)).any()
+
+    @property
+    def closes(self) -> str:
+        """The row that closes a gate, the worst where several do; empty without any."""
+        bad, moved = self.regressions, self.moved
+        if not len(bad) and not len(moved):
+            return ""
+        return told(bad.iloc[0] if len(bad) else moved.iloc[0])
 
     @property
     def lacking(self) -> list[str]:
@@ -112,14 +120,8 @@ class Difference:
             tail += f", {failed} of which failed" * bool(failed)
         if not n_bad:
             return f"{head}: no regression{tail}"
-        worst = counted(n_bad, "regression")
-        first = self.regressions.iloc[0]
-        whose = [str(first["simulator"])] if "simulator" in first else []
-        where = [f"case {first['case']}", *([] if pd.isna(first["frame"]) else [f"frame {first['frame']}"])]
-        place = ", ".join([*whose, " ".join(where)])
-        was, now = (f"{v:.4g}" if isinstance(v, float) else v for v in first[["before", "after"]])
-        allowed = "" if pd.isna(first["allowed"]) else f" (allowed {first['allowed']:.4g})"
-        return f"{head}: {worst}; the worst: {place}, {first['column']} {was} -> {now}{allowed}{tail}"
+        alone = "; no error of a simulated wire is worse than is allowed" * self.beside_errors
+        return f"{head}: {how_many(self.rows)}; the worst: {self.closes}{alone}{tail}"
 
     def _compared(self) -> str:
         """How many cases were compared, of how many."""
@@ -158,16 +160,15 @@ def diff_folders(
 
 def not_judged(tolerance: Mapping[str, float]) -> str:
     """A sentence where the tolerance names no error of the simulated wire, so that none is compared; else empty."""
-    names = [name for name in tolerance if name != RATIO]
-    lengths = {name for name in names if ERRORS[name].unit == "mm" and ERRORS[name].better == "low"}
-    if any(name not in BEFORE_COMPARE and not name.startswith("u_") for name in lengths):  # u_: what is not known
+    names = columns_in(tolerance)
+    if any(is_error(name) and ERRORS[name].unit == "mm" for name in names):
         return ""
     return f"no error of the simulated wire is judged frame by frame: the tolerance names {', '.join(names)} alone"
 
 
 def _has_numbers(table: pd.DataFrame, tolerance: Mapping[str, float]) -> bool:
     """Whether a frame is ok and has a value that could become worse: an error, where the tolerance names one."""
-    names = [name for name in tolerance if name != RATIO]
+    names = columns_in(tolerance)
     directed = [name for name in names if ERRORS[name].better]
     names = [name for name in directed if name not in BEFORE_COMPARE] or directed or names
     good = table[table["status"].isin(GOOD)]
@@ -185,7 +186,6 @@ def diff_tables(
     Regressions, too, are a missing or damaged case, a missing frame, and a frame that fails only in the second run.
     """
     rows: list[Row] = []
-    tolerance = {name: allowed for name, allowed in tolerance.items() if name != RATIO}
     for case in dict.fromkeys([*before, *after, *damaged]):
         if case in damaged:
             rows.append((case, pd.NA, "status", "whole", damaged[case], math.nan, math.nan, "regression"))
@@ -224,13 +224,14 @@ def _case_rows(before: pd.DataFrame, after: pd.DataFrame, tolerance: Mapping[str
             yield frame, "status", was, now, math.nan, math.nan, verdict
             if (was == FITTED) != (now == FITTED):  # an error of a frame that the roll was fitted on is no score
                 continue
-            for name, allowed in tolerance.items():
+            for name in columns_in(tolerance):
                 if verdict == "better" and not ERRORS[name].better:  # of a frame that failed, another depth was known
                     continue
                 pair = (old[frame][name], new[frame][name])
                 a, b = (math.nan if pd.isna(value) else float(value) for value in pair)
                 # a frame that fails now counts once, though it may have errors
                 if verdict in ("same", "better") or (verdict == "moved" and not math.isnan(b)):
+                    allowed = allowed_of(tolerance, name, a)
                     yield frame, name, a, b, b - a, allowed, _verdict(name, a, b, allowed)
         elif frame in old:
             yield frame, "frame", "present", "missing", math.nan, math.nan, "regression"

@@ -3,16 +3,18 @@
 Each case says it of itself: a folder may hold cases that were run at different times.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
 from reports.case_files import counted, listed, manifests_in, results_in, runs_in
 from reports.records import read_json
+from reports.schema import OURS
 
 CODE = {"wireval": "wireval", "git_commit": "commit", "git_dirty": "changed files", "python": "Python"}
-ABSENT, TOLD, UNTOLD = "(none)", "stand in its results", "(not kept)"
+ABSENT = "(none)"
+TOLD, UNTOLD = "kept in its result.json", "(not kept): of this run there are tables alone, without result.json"
 WIRES = "simulated.files"
 """Key of the manifest for another simulator's wires, and how their files' keys begin."""
 Told = dict[str, str]
@@ -30,7 +32,7 @@ def what_differs(before: Path, after: Path) -> list[dict[str, str]]:
     silent = [told.keys() <= {"cases"} for told in (first, second)]
     if any(silent):  # golden tables say nothing of where they come from
         of_cases = []
-        what = "settings, code and inputs"
+        what = "settings, code and inputs: not compared"
         first, second = ({"cases": told["cases"], what: UNTOLD if mute else TOLD}
                          for told, mute in zip((first, second), silent, strict=True))  # fmt: skip
     rows = [(name, first.get(name, ABSENT), second.get(name, ABSENT)) for name in dict.fromkeys([*first, *second])]
@@ -43,10 +45,20 @@ def what_differs(before: Path, after: Path) -> list[dict[str, str]]:
     return [{"what": name, "before": a, "after": b} for name, a, b in rows if a != b]
 
 
-def of_two_simulators(differs: Sequence[Mapping[str, str]]) -> str:
-    """That one run's wires are the solver's own and the other's another simulator's. differs : of ``what_differs``."""
-    handed = [row for row in differs if row["what"].endswith(f": {WIRES}") and ABSENT in (row["before"], row["after"])]
-    return "the wires of one run are the solver's own, those of the other another simulator's" * bool(handed)
+def of_two_simulators(before: Path, after: Path) -> str:
+    """That one output folder's wires are the solver's own and the other's another simulator's; empty where not so.
+
+    A simulator that wrote nothing for one case of several has no files there: that case is not the solver's own.
+    """
+    old, new = results_in(before), results_in(after)
+    handed = [any(_handed(found[case]) for case in old.keys() & new.keys()) for found in (old, new)]
+    return "the wires of one run are the solver's own, those of the other another simulator's" * (len({*handed}) > 1)
+
+
+def _handed(result: Mapping[str, Any]) -> bool:
+    """Whether a case's wires are another simulator's: a score names whose they are, else its input files say so."""
+    keys = (str(item.get("key", "")) for item in result.get("inputs", ()))
+    return bool(name != OURS) if (name := result.get("simulator")) else any(key.startswith(WIRES) for key in keys)
 
 
 def told_alike(before: Path, after: Path) -> str:

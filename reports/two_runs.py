@@ -135,8 +135,12 @@ class Verdict:
             for head, table in self.tables().items()
             if len(table)
         ]
-        verdict = f"Verdict: {self.word.upper()}.{f' Pooled: {self.paired}' if self.paired else ''}\n"
+        by = self.frames.closes
+        closed = f" What closes the gate, the worst first: {by}." * bool(by and self.word in ("worse", "moved"))
+        alone = " No error of a simulated wire is worse than is allowed." * self.frames.beside_errors
+        pooled = f" Pooled: {self.paired}" * bool(self.paired)
+        verdict = f"Verdict: {self.word.upper()}.{closed}{alone if self.judged != 'worse' else ''}{pooled}\n"
         parts.insert(1 if self.differs else 0, verdict)
         parts[:0] = [f"{self.alike[0].upper()}{self.alike[1:]}.\n"] if self.alike else []
-        gate = "exit 1, the gate closes" if self.closed else "exit 0, the gate stays open"
+        gate = "FAIL, exit 1, the gate closes" if self.closed else "PASS, exit 0, the gate stays open"
         return [*parts, f"{self.sentence}: {gate}"]

@@ -13,6 +13,7 @@ import pandas as pd
 
 from reports._content import Grid, grid
 from reports.atomic import write_text
+from reports.closing import change_of, worst_first
 from reports.diff import CLOSING
 from reports.junit import Outcome, write_junit
 from reports.page import write_page
@@ -135,15 +136,12 @@ def _outcome(frame: Any, rows: pd.DataFrame) -> Outcome:
     name = "case" if pd.isna(frame) else f"frame {frame!s}"
     bad = rows[rows["verdict"].isin(CLOSING)]
     if len(bad):
-        said = [f"{r.column}: {_text(r.before)} -> {_text(r.after)}" for r in bad.itertuples()]
+        bad = pd.concat([worst_first(bad[bad["verdict"] == verdict]) for verdict in CLOSING])
+        said = [change_of(row) for row in bad.to_dict("records")]
         return Outcome(name, "failed", said[0], bad["verdict"].iloc[0], "\n".join(said))
     if (rows["verdict"] == "new").all():
         return Outcome(name, "skipped", f"only the second run has it: {rows['after'].iloc[0]}")
     return Outcome(name)
-
-
-def _text(value: Any) -> str:
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
 def _there(page: Path, place: Path) -> str:

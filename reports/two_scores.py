@@ -36,11 +36,23 @@ def together(runs: tuple[Path, Path], parts: Mapping[str, Verdict], gone: list[s
         "; ".join(f"{name}: {part.paired}" for name, part in parts.items() if part.paired),
         judged,
         Difference(rows, empty),
-        "; ".join(dict.fromkeys(part.caveat for part in parts.values() if part.caveat)),
+        _caveats({name: part.caveat for name, part in parts.items()}, several=len(parts) + len(lone) > 1),
         "; ".join(told) if all(told) and not lone else "",
         [{"simulator": name, **row} for name, part in parts.items() for row in part.warned],
         "; ".join(f"{name}: {part.void}" for name, part in parts.items() if part.void),
     )
+
+
+def _caveats(said: Mapping[str, str], *, several: bool) -> str:
+    """What is to be added of all simulators once, else behind the names of those that it is said of.
+
+    several : whether there are more of them than one, whether in both runs or not.
+    """
+    owners = {text: [name for name, own in said.items() if own == text] for text in said.values() if text}
+    everyone = next(iter(owners), "") if len(owners) == 1 and len(said) > 1 else ""
+    if everyone and len(owners[everyone]) == len(said):
+        return everyone
+    return "; ".join(f"{', '.join(names)}: {text}" if several else text for text, names in owners.items())
 
 
 def _differs(parts: Mapping[str, Verdict]) -> list[dict[str, Any]]:

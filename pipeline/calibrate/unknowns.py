@@ -48,14 +48,14 @@ class Unknown:
 
 
 def spread_in_words(sd: float, *, logarithmic: bool) -> str:
-    """A standard deviation without an exponent; of the logarithm of a factor in per cent of it, or as a factor itself.
+    """A standard deviation to two digits, no exponent; of a factor's logarithm in per cent, or as a factor itself.
 
     From 30 % on per cent mislead: 143 % of a wall are a factor of 4.2 up or down, and not less than nothing.
     """
     if logarithmic and sd > 0.3:
-        return f"a factor of {np.exp(sd):.3g}"
+        return f"a factor of {np.exp(sd):.2g}"
     value = 100.0 * sd if logarithmic else sd
-    return (f"{value:.3g}" if value < 1000.0 else f"{value:.0f}") + " %" * logarithmic
+    return (f"{value:.2g}" if value < 99.5 else f"{value:.0f}") + " %" * logarithmic
 
 
 def _factor(name: str, sd: float, most: float, step: float, what: str) -> Unknown:

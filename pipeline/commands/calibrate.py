@@ -56,7 +56,7 @@ def _fit(args: argparse.Namespace, cases: "tuple[Case, ...]", config: "Config", 
     from pipeline.calibrate.unknowns import spread_in_words
     from pipeline.run.calibration import calibrate, gathered
     from pipeline.run.calibration_files import flattened, misfit, write_parameters, write_record
-    from reports.calibration import gained, render_calibration
+    from reports.calibration import gained, render_calibration, to_its_digits
 
     found = gathered(cases, config, store, (lambda _: None) if args.quiet else say)
     fit = calibrate(found, config)
@@ -66,10 +66,10 @@ def _fit(args: argparse.Namespace, cases: "tuple[Case, ...]", config: "Config", 
     write_record(args.out / "calibration.json", found, fit)
     for one in written.estimate:
         sd = spread_in_words(one.sd, logarithmic=one.logarithmic)
-        unseen = f"  not seen in these traces, stays as stated; the fit alone gave {one.value:g}: {one.why}"
-        apart = f"  ({one.value:g} where all parameters are free)" * (f"{one.value:g}" != f"{one.used:g}")
-        verdict = apart if one.seen else unseen
-        say(f"{one.name:20s} {one.used:10g}  +- {sd:8s}{verdict}")
+        fitted, used = (to_its_digits(vars(one), key) for key in ("value", "used"))
+        unseen = f"  not seen in these traces, stays as stated; the fit alone gave {fitted}: {one.why}"
+        verdict = f"  ({fitted} where all parameters are free)" * (fitted != used) if one.seen else unseen
+        say(f"{one.name:20s} {used if one.seen else f'{one.used:g}':>10s}  +- {sd:8s}{verdict}")
     if said := gained([vars(frame) for frame in fit.frames]):
         say(said)
     warnings = (f"warning: {text}" for text in (*misfit(fit), *flattened(found)))

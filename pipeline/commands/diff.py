@@ -19,7 +19,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("first", type=Path, metavar="OUT_A", help="the baseline")
     add("second", type=Path, metavar="OUT_B", help="the candidate")
-    add("--tolerance", type=Path, metavar="T", help="TOML, column = allowed increase; a default ships")
+    add(
+        "--tolerance",
+        type=Path,
+        metavar="T",
+        help="TOML, column = allowed increase; [share]: as a share; a default ships",
+    )
     for name, what in FILES.items():
         add(f"--{name}", type=Path, metavar="FILE", help=f"write {what}")
     add_quiet(parser)

@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pipeline.commands import complain, say
+from pipeline.commands import add_quiet, complain, say
 
 if TYPE_CHECKING:
     from pipeline.run.results import Result
@@ -29,6 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--overview", action="store_true", help="the tables and the page over all cases alone, in seconds")
     add("--embed", action="store_true", help="put the pictures into the pages: one file a page")
     add("--pdf", action="store_true", help="also write summary.pdf, four pages on paper")
+    add_quiet(parser)
 
 
 def main(args: argparse.Namespace) -> int:
@@ -63,10 +64,12 @@ def main(args: argparse.Namespace) -> int:
     if args.pdf:
         from reports.pdf import write_pdf
 
-        say(f"summary: {write_pdf(args.out)}")
+        summary = write_pdf(args.out)
+        if not args.quiet:
+            say(f"summary: {summary}")
     whole = _all_there(args.out, found if args.overview else ())
     first = next((f"{name}: " for name in folders_in(args.out)), "")
-    sys.stderr.writelines(f"{first}{line}\n" for line in totals.closed)
+    sys.stderr.writelines(f"FAIL: {first}{line}\n" for line in totals.closed)
     say(last_line(totals, page))
     return 0 if totals.all_ok and not totals.closed and others_ok and drawn and whole else 1
 
@@ -107,7 +110,7 @@ def _all_drawn(args: argparse.Namespace, found: Sequence["Result"]) -> bool:
             if outcome.status == "unwritable":
                 raise WriteError(outcome.error)
             wrong += [(outcome.job.case, problem)] if problem else []
-            if len(found) >= MANY and not problem:
+            if len(found) >= MANY and not problem and not args.quiet:
                 sys.stderr.write(f"{count}/{len(found)} {outcome.job.case}: drawn\n")
     _tell(wrong)
     return not wrong
@@ -160,7 +163,7 @@ def _others(out: Path, *, embed: bool) -> bool:
     good = []
     for name, folder in [*folders.items()][1:]:
         totals = aggregate(folder)
-        sys.stderr.writelines(f"{name}: {line}\n" for line in totals.closed)
+        sys.stderr.writelines(f"FAIL: {name}: {line}\n" for line in totals.closed)
         good += [totals.all_ok, not totals.closed, _all_there(folder, found_results(folder), f"{name}: ")]
         say(f"{name}: report: {render_index(folder, embed)}")
     for line in side_by_side(out, folders, embed) if folders else ():

@@ -68,7 +68,6 @@ def _run(args: argparse.Namespace, gates: "Sequence[Gate]") -> int:
     from pipeline.run.batch import require_cluster
     from pipeline.run.last_words import last_line
     from pipeline.run.launch import intention, launch
-    from pipeline.run.results import found_results
     from pipeline.study.plausible import doubts
 
     plan = _plan(args)
@@ -86,10 +85,10 @@ def _run(args: argparse.Namespace, gates: "Sequence[Gate]") -> int:
     require_cluster(plan.address)  # before OUT is claimed
     totals, index = launch(plan)
     if args.junit:
-        write_tests(args.junit, {"": found_results(plan.out)}, totals.gates)
+        write_tests(args.junit, {"": plan.out}, totals.gates)
     _tell(plan, totals)
     for line in () if plan.template.quiet else totals.opened:
-        say(line)
+        say(f"PASS: {line}")
     say(last_line(totals, index))
     return 0 if totals.all_ok and not totals.closed else 1
 
@@ -125,7 +124,7 @@ def _tell(plan: "Plan", totals: "Totals") -> None:
     from reports.verdict import remarks
     from reports.what_next import warned
 
-    sys.stderr.writelines(f"{line}\n" for line in (*failure_lines(plan), *totals.closed))
+    sys.stderr.writelines(f"{line}\n" for line in (*failure_lines(plan), *(f"FAIL: {why}" for why in totals.closed)))
     aside(warned(plan.out), quiet=plan.template.quiet)
     for text in remarks(totals.pooled):
         say(f"warning: {text}")

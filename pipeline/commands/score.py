@@ -2,7 +2,7 @@
 
 import argparse
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,6 +13,7 @@ from pipeline.commands.given import add_calibrated, file_of
 if TYPE_CHECKING:
     from pipeline.run.aggregate import Totals
     from pipeline.run.launch import Plan
+    from pipeline.study.manifest import Case
 
 HELP = "judge other simulators' wires by the same pipeline, side by side with the solver's own"
 
@@ -65,6 +66,7 @@ def main(args: argparse.Namespace) -> int:
     (args.out / "simulators").mkdir(parents=True, exist_ok=True)
     for earlier in (SIMULATORS.file, WHERE.file, PAGE):  # a score that is ended would leave them
         (args.out / earlier).unlink(missing_ok=True)
+    sys.stderr.writelines(_lost(args.curves, [case.id for case in plans[OURS].cases]))
     totals = _judged(plans, args.quiet)
     warnings = said_once({name: warned(plan.out) for name, plan in plans.items()})
     aside(warnings, quiet=args.quiet)
@@ -72,23 +74,33 @@ def main(args: argparse.Namespace) -> int:
         say(line)
     if args.junit:
         _write_junit(args.junit, plans, totals)
-    for line in () if args.quiet else [f"{name}: {line}" for name, one in totals.items() for line in one.opened]:
+    for line in () if args.quiet else [f"PASS: {name}: {line}" for name, one in totals.items() for line in one.opened]:
         say(line)
-    sys.stderr.writelines(f"{name}: {why}\n" for name, one in totals.items() for why in one.closed)
+    sys.stderr.writelines(f"FAIL: {name}: {why}\n" for name, one in totals.items() for why in one.closed)
     return 0 if all(one.all_ok and not one.closed for one in totals.values()) else 1
+
+
+def _lost(curves: Sequence[str], cases: Sequence[str]) -> Iterator[str]:
+    """A line for each simulator that wrote nothing for some cases: it crashed there, or a folder is misspelt."""
+    from pipeline.study.others import lost_in, named
+    from reports.case_files import listed
+
+    for name, place in named(curves).items():
+        if lost := lost_in(place, cases):
+            what = f"no folder CASE/ nor CASE.h5 for {listed(lost)}"
+            yield f"warning: {name}: {place} has {what}: every frame of {'it' if len(lost) == 1 else 'them'} fails\n"
 
 
 def _write_junit(path: Path, plans: "Mapping[str, Plan]", totals: "Mapping[str, Totals]") -> None:
     """The frames of all simulators, and the gates of each."""
     from pipeline.run.aggregate import write_tests
-    from pipeline.run.results import found_results
 
     gates = {
         f"{name}: {asked}": f"{name}: {why}" * bool(why)
         for name, one in totals.items()
         for asked, why in one.gates.items()
     }
-    write_tests(path, {f"{name}/": found_results(plan.out) for name, plan in plans.items()}, gates)
+    write_tests(path, {f"{name}/": plan.out for name, plan in plans.items()}, gates)
 
 
 def _judged(plans: "Mapping[str, Plan]", quiet: bool) -> "dict[str, Totals]":
@@ -124,12 +136,12 @@ def _plans(args: argparse.Namespace) -> "dict[str, Plan]":
     from pipeline.run.cache import default_root
     from pipeline.run.calibrated import as_calibrated
     from pipeline.run.case import Job
-    from pipeline.run.guards import guard_apart
+    from pipeline.run.guards import guard_apart, guard_score
     from pipeline.run.inputs import named_files
     from pipeline.run.launch import Plan
     from pipeline.status import UsageError
     from pipeline.study.manifest import Manifest, read_manifest
-    from pipeline.study.others import Others, found_for, named
+    from pipeline.study.others import named
     from reports.schema import OURS
     from reports.simulators import folders_in
 
@@ -146,16 +158,24 @@ def _plans(args: argparse.Namespace) -> "dict[str, Plan]":
     calibrated, notes = as_calibrated(manifest.cases, args.parameters, own=args.score_used)
     manifest = Manifest(manifest.path, calibrated)
     plans: dict[str, Plan] = {}
-    alone = len(manifest.cases) == 1
-    stated = {"space": args.space, "unit": args.unit}
     for name, place in {**names, OURS: None}.items():
-        cases = []
-        for case in calibrated:
-            files = None if place is None else found_for(case.id, place, alone)
-            others = None if files is None else Others.model_validate(stated | ({"files": files} if files else {}))
-            cases.append(case.model_copy(update={"simulated": others}))
+        cases = _with_wires(calibrated, place, args)
         out = args.out / "simulators" / name if plans else args.out
         how = {"fresh": args.fresh, "embed": args.embed, "quiet": args.quiet, "simulator": name}
         template = Job(cases[0], settings, out, cache=default_root(), **how)
-        plans[name] = Plan(manifest, tuple(cases), template, workers=args.jobs, assumptions=notes)
+        plans[name] = Plan(manifest, cases, template, workers=args.jobs, assumptions=notes)
+    if not args.fresh:
+        guard_score({name: (plan.out, plan.cases) for name, plan in plans.items()}, settings)
     return plans
+
+
+def _with_wires(cases: "Sequence[Case]", place: Path | None, args: argparse.Namespace) -> "tuple[Case, ...]":
+    """The cases with the wires that a place holds for them; with the solver's own where there is no place."""
+    from pipeline.study.others import Others, found_for
+
+    stated, ids, made = {"space": args.space, "unit": args.unit}, [case.id for case in cases], []
+    for case in cases:
+        files = None if place is None else found_for(case.id, place, ids)
+        others = None if files is None else Others.model_validate(stated | ({"files": files} if files else {}))
+        made.append(case.model_copy(update={"simulated": others}))
+    return tuple(made)

@@ -17,7 +17,7 @@ from pipeline.run.exchanged import exchanged
 from pipeline.run.gate import CLOSED, parsed
 from pipeline.run.kin import told_of_kin
 from pipeline.run.overall import Found, found_cases, frames_of, overall, shared_scans, strangers, validation
-from pipeline.run.results import Result, write_json
+from pipeline.run.results import Result, found_results, write_json
 from pipeline.status import UsageError
 from reports import tables
 from reports.case_files import GOOD, not_reached
@@ -25,7 +25,7 @@ from reports.doubts import AMONG, copied_from_traces, doubted, warnings_in
 from reports.gates import GATES, asked_of
 from reports.junit import Outcome, write_junit
 from reports.origin import why_not_pooled
-from reports.schema import FAILURES, OVERALL_FILE, SUMMARY, TIMINGS
+from reports.schema import ERRORS, FAILURES, OVERALL_FILE, SUMMARY, TIMINGS
 from reports.verdict import remarks, unscored
 
 
@@ -104,7 +104,7 @@ def aggregate(out: Path, run_info: dict[str, Any] | None = None, name: str = "ru
         whole,
         mixed or unscored((result.role, result.status) for result in found) or not_reached(out),
         bool(mixed),
-        *_judged(out, asked_of(out) if run_info is None else run_info.get("fail_if", ()), whole),
+        *_judged(out, asked_of(out) if run_info is None else run_info.get("fail_if", ()), whole, validation(among)),
         frames_fitted=sum(row.get("frames_fitted") or 0 for row in rows),
     )
 
@@ -123,10 +123,13 @@ def _keep_what_is_seen(out: Path, found: Sequence[Result], among: Sequence[Found
         write_json(out / AMONG, {"assumptions": assumed, "doubts": doubts})
 
 
-def _judged(out: Path, asked: Sequence[str], overall: Mapping[str, Any]) -> tuple[dict[str, str], list[str]]:
+def _judged(
+    out: Path, asked: Sequence[str], overall: Mapping[str, Any], scored: Sequence[Found]
+) -> tuple[dict[str, str], list[str]]:
     """By each condition why a run must not pass, empty where it may, and what is said of those; also for its page.
 
     Errors of wires that were made from the traces open no gate. overall : the row of the run into ``out``.
+    scored : its cases.
     """
     (out / GATES).unlink(missing_ok=True)
     if not asked:
@@ -140,9 +143,27 @@ def _judged(out: Path, asked: Sequence[str], overall: Mapping[str, Any]) -> tupl
             told[f"--fail-if {text}"] = f"{CLOSED}: --fail-if {text}: {OVERALL_FILE} of this version has no such number"
             continue
         told[one.asked] = why = f"{CLOSED}: {one.asked}: {copied}" if copied else one.closed(overall)
+        if why and not copied and pd.notna(overall.get(one.column)):
+            told[one.asked] += _worst(scored, one.column)
         opened += [] if why else [one.open(overall)]
     write_json(out / GATES, {"closed": [why for why in told.values() if why], "open": opened})
     return told, opened
+
+
+def _worst(scored: Sequence[Found], column: str) -> str:
+    """Which frame is the worst by a column of overall.csv, and its page; empty for what no frame has."""
+    name = column.replace("_median", "")
+    if name not in ERRORS.names or not ERRORS[name].better:
+        return ""
+    sign = -1.0 if ERRORS[name].better == "high" else 1.0
+    of_all: list[tuple[str, int, Any]] = [
+        (case.result.case, n, frame.row.get(name)) for case in scored for n, frame in case.frames.items()
+    ]
+    known = [(case, n, float(value)) for case, n, value in of_all if pd.notna(value)]
+    if not known:
+        return ""
+    case, frame, value = max(known, key=lambda row: sign * row[2])
+    return f"; the worst: case {case} frame {frame} ({name} {value:.4g}), cases/{case}/report.html"
 
 
 def _times(out: Path, found: Sequence[Result]) -> tuple[pd.DataFrame, float]:
@@ -159,19 +180,30 @@ def _times(out: Path, found: Sequence[Result]) -> tuple[pd.DataFrame, float]:
     return pd.concat(parts, ignore_index=True) if parts else tables.read_if_there(None, TIMINGS), replayed_s
 
 
-def write_tests(path: Path, found: Mapping[str, Sequence[Result]], gates: Mapping[str, str]) -> None:
+def write_tests(path: Path, folders: Mapping[str, Path], gates: Mapping[str, str]) -> None:
     """Write a JUnit summary: a suite per case, a test per frame (one test for a case without frames), a suite of gates.
 
-    found : the cases by what their suites' names begin with.     gates : as in ``Totals``.
+    folders : outputs by what the names of their cases' suites begin with.     gates : as in ``Totals``.
     """
-    suites = [
-        (f"{whose}{result.case}", [_outcome(frame) for frame in result.frames or [_whole(result)]])
-        for whose, results in found.items()
-        for result in results
-    ]
+    suites = []
+    for whose, out in folders.items():
+        for result in found_results(out):
+            seconds = _seconds(out / "cases" / result.case / TIMINGS.file)
+            frames = [_outcome(frame, seconds) for frame in result.frames or [_whole(result)]]
+            suites.append((f"{whose}{result.case}", frames))
     if gates:
         suites.append(("gates", [Outcome(n, "failed" if why else "passed", why, "gate") for n, why in gates.items()]))
     write_junit(path, "wireval", suites)
+
+
+def _seconds(path: Path) -> dict[Any, float]:
+    """Seconds of a case's frames by their numbers, in all stages that are known by frame; of the whole under "case"."""
+    with suppress(OSError, ValueError):
+        table = tables.read_if_there(path, TIMINGS)
+        steps = table[[name for name in TIMINGS.names if name.endswith("_s")]].fillna(0.0)
+        by_frame = steps.drop(columns="total_s").sum(axis=1).where(table["frame"].notna(), steps["total_s"])
+        return dict(zip(table["frame"].astype(object).where(table["frame"].notna(), "case"), by_frame, strict=True))
+    return {}
 
 
 def _whole(result: Result) -> dict[str, Any]:
@@ -179,8 +211,8 @@ def _whole(result: Result) -> dict[str, Any]:
     return {"frame": "case", "status": result.status, "sentence": result.sentence, "message": why}
 
 
-def _outcome(frame: Mapping[str, Any]) -> Outcome:
-    name = f"frame {frame['frame']}"
+def _outcome(frame: Mapping[str, Any], seconds: Mapping[Any, float]) -> Outcome:
+    name, took = f"frame {frame['frame']}", float(seconds.get(frame["frame"], 0.0))
     if frame["status"] in GOOD:
-        return Outcome(name)
-    return Outcome(name, "failed", frame["sentence"], frame["status"], frame["message"])
+        return Outcome(name, seconds=took)
+    return Outcome(name, "failed", frame["sentence"], frame["status"], frame["message"], took)

@@ -28,6 +28,7 @@ from pipeline.study.settings import Config
 SAME_MM = 0.5
 """Standard deviation between insertions, mm, of the offset of stated depths, where one insertion alone states any."""
 LEAST_FRAMES = 3
+PLANNED = "it has neither frames nor traces to fit to; what such a study would show is predicted with --design"
 Say = Callable[[str], None]
 
 
@@ -81,8 +82,9 @@ def gathered(cases: Sequence[Case], config: Config, store: Store, say: Say) -> G
 
     CalibrationError where none is left.
     """
-    used, trials, stated, voxels, traced, left_out, notes = [], [], [], [], [], [], []
-    for case in cases:
+    used, trials, stated, voxels, traced, notes = [], [], [], [], [], []
+    left_out = [f"{case.id}: left out: {PLANNED}" for case in cases if not case.compared]
+    for case in (case for case in cases if case.compared):
         log = Log(lambda *_: None)
         run = Context(case, config, store, log, until="trace", inputs=Inputs.of(case))
         known = run_stages(run)

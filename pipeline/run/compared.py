@@ -72,7 +72,8 @@ def _of_one(first: Path, second: Path, tolerance: Mapping[str, float]) -> Verdic
     nearer = ""
     if paired and paired.value < 1.0 / allowed and len(frames.regressions) and not otherwise:
         nearer = f"but over all frames the errors are {paired.value:.3g} times those of the first run"
-    caveat = "; ".join(filter(None, (otherwise, of_two_simulators(differs), unpaired, not_judged(tolerance), nearer)))
+    others = of_two_simulators(first, second)
+    caveat = "; ".join(filter(None, (otherwise, others, unpaired, not_judged(tolerance), nearer)))
     warned = warned_of(first), warned_of(second)
     void = newly_void(*warned) or not_judged(tolerance) * (paired is not None and judged == "withheld")
     told = told_alike(first, second), newly_warned(*warned), void

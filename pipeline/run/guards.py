@@ -1,12 +1,12 @@
 """Before a run writes into a folder: what lies there, and whether the new results may stand beside it."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from pipeline.run.hashing import file_hash
-from pipeline.run.inputs import other_file, stated
+from pipeline.run.inputs import named_files, other_file, stated
 from pipeline.run.log import STAGES, Stage
 from pipeline.run.provenance import written_at
 from pipeline.run.results import jsonable
@@ -14,7 +14,7 @@ from pipeline.status import UsageError
 from pipeline.study.manifest import Case
 from pipeline.study.settings import Resolved
 from reports.case_files import find_cases
-from reports.origin import ABSENT, settings_of
+from reports.origin import ABSENT, WIRES, settings_of
 from reports.records import read_json
 
 WRITTEN = "cases", "sweep", "simulators", "figures"
@@ -95,6 +95,33 @@ def _changed(known: Mapping[str, Any], settings: Resolved) -> str:
     old, new = settings_of(known), settings_of({"config": jsonable(settings.as_dict())})
     pairs = {name: (old.get(name, ABSENT), new.get(name, ABSENT)) for name in dict.fromkeys([*old, *new]) if old}
     return ", ".join(f"{name} {before} before, {now} now" for name, (before, now) in pairs.items() if before != now)
+
+
+def guard_score(scored: Mapping[str, tuple[Path, Sequence[Case]]], settings: Resolved) -> None:
+    """Refuse to put a simulator's results in the place of those of wires from elsewhere, or with other settings.
+
+    scored : folder and cases by simulator. The same files written again are the same wires, mended: what failed is
+    computed again by the same command.
+    """
+    do = "name another folder, or say --fresh (compute again)"
+    for name, (out, cases) in scored.items():
+        with suppress(ValueError):  # an unreadable result is replaced
+            for info in sorted(out.glob("run*.json")):
+                if changed := _changed(read_json(info), settings):
+                    raise UsageError([f"{out} was scored with other settings: {changed}; {do}"])
+        for case in cases:
+            with suppress(ValueError):
+                before = _wires_in(read_json(out / "cases" / case.id / "result.json"))
+                now = {path.parent.resolve() for key, path in named_files(case).items() if key.startswith(WIRES)}
+                if before and now and not before & now:
+                    what = f"it holds a score of {name} by the wires in {min(before)}, which would be replaced"
+                    raise UsageError([f"-o {out}: {what} by that of those in {min(now)}; {do}"])
+
+
+def _wires_in(result: Mapping[str, Any]) -> set[Path]:
+    """The folders of another simulator's wires that a result is of; none of those that are not known any more."""
+    rows = [row for row in result.get("inputs", ()) if str(row.get("key", "")).startswith(WIRES)]
+    return {path.parent.resolve() for row in rows if (path := Path(row["path"])).is_absolute() or path.exists()}
 
 
 def guard_stages(out: Path, until: Stage) -> None:

@@ -141,12 +141,23 @@ def tightest_bend(points_mm: Array, radius_mm: float, rest_per_mm: ArrayLike = 0
     return float(turn[worst]), at_arc(points_mm, arc[[worst + STEPS // 2 + 1]])[0]
 
 
-def not_to_depth(length_mm: float, depth_mm: float, tolerance_mm: float, stated: str = "mm") -> str:
-    """Why a wire does not have this depth, with a guess at its unit; empty where it does. stated : see ``oddity``."""
+ENDS_EARLY = 0.75
+"""Share of a frame's depth below which a wire looks cut off, and not held back."""
+
+
+def not_to_depth(
+    length_mm: float, depth_mm: float, tolerance_mm: float, stated: str = "mm", *, others_fit: bool = False
+) -> str:
+    """Why a wire does not have this depth, with a guess at why not; empty where it does.
+
+    stated : see ``oddity``.     others_fit : wires of other frames, stated in this unit, have their depths.
+    """
     if abs(length_mm - depth_mm) <= tolerance_mm:
         return ""
     unit = unit_of(depth_mm / max(length_mm, 1e-9), SAME, stated)
-    hint = f"; is it in {unit}?" if unit else ""
+    hint = f"; is it in {unit}?" if unit and not others_fit else ""
+    if others_fit and length_mm < ENDS_EARLY * depth_mm:
+        hint = "; wires of other frames are as long as these are deep: does its file end early?"
     return f"it is {length_mm:.3g} mm long from the entry on, the frame {depth_mm:.2f} mm deep{hint}"
 
 

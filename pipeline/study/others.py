@@ -33,12 +33,14 @@ WORDS: JsonDict = {"$comment": f"{NAMES['$comment']}, or a table {{files = ..., 
 OthersText = Annotated[Others | None, BeforeValidator(written_out), Field(json_schema_extra=WORDS)]
 
 
-def found_for(case: str, place: Path, alone: bool) -> list[str]:
+def found_for(case: str, place: Path, cases: Sequence[str]) -> list[str]:
     """The files that a place holds for a case, in natural order: of ``--curves``, a folder, a file or a pattern.
 
     A folder holds one of its own for each case (``CASE/`` or ``CASE.h5``) or is an output of `wireval run`; where the
-    manifest has one case, it may hold the files themselves. Raises UsageError where none of this is so.
+    manifest has one case, it may hold the files themselves. Of a case that has none there, where another of ``cases``
+    has, nothing is found: the simulator wrote nothing for it. Raises UsageError where none of this is so.
     """
+    alone = len(cases) == 1
     if any(mark in place.name for mark in "*?["):
         return _matching(case, place) if alone else _refuse(case, place, "a pattern serves one case")
     if status_of(place) is None:
@@ -50,8 +52,9 @@ def found_for(case: str, place: Path, alone: bool) -> list[str]:
     if ran and case not in ran:
         has = f"{', '.join(sorted(ran)[:4])}{' ...' * (len(ran) > 4)}"
         return _refuse(case, place, f"it is the output of a run, of {has}")
-    named = [place / "cases" / case / "frames.h5", place / case, place / f"{case}.h5", *[place] * alone]
-    here = next((path for path in named if path.exists()), None)
+    here = next((path for path in [*_places(case, place), *[place] * alone] if path.exists()), None)
+    if here is None and case in lost_in(place, cases):
+        return []
     if here is None:
         return _refuse(case, place, f"found neither {case}/ nor {case}.h5 in it")
     if here.is_file():
@@ -65,6 +68,17 @@ def found_for(case: str, place: Path, alone: bool) -> list[str]:
         found = f"; found {', '.join(names[:4])}{' ...' * (len(names) > 4)}" if names else "; it is empty"
         return _refuse(case, here, f"no wire in it ({', '.join(KINDS)}){found}")
     return _sorted(inside)
+
+
+def _places(case: str, place: Path) -> list[Path]:
+    """Where a folder may have a case's wires."""
+    return [place / "cases" / case / "frames.h5", place / case, place / f"{case}.h5"]
+
+
+def lost_in(place: Path, cases: Sequence[str]) -> list[str]:
+    """The cases for which a simulator wrote nothing into a folder that holds wires of others; none elsewhere."""
+    lost = [case for case in cases if not any(path.exists() for path in _places(case, place))]
+    return lost if len(lost) < len(cases) else []
 
 
 def _matching(case: str, pattern: Path) -> list[str]:

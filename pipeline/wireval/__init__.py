@@ -148,8 +148,8 @@ def calibrate(manifest: Place, out: Place, **more: bool | Settings) -> Path:
 def diff(first: Place, second: Place, *, tolerance: Place | None = None) -> Verdict:
     """Tell whether a second run (or score) is worse than a first one.
 
-    tolerance : a TOML file that says how much worse each column may become, such as ``rms_mm = 0.03``. By default it is
-    the one that is installed with wireval.
+    tolerance : a TOML file that says how much worse each column may become, such as ``rms_mm = 0.03``; its table
+    ``share`` says by which share of the first value, where that is more. By default the one installed with wireval.
     Raises InputError where the two cannot be compared.
     """
     try:

@@ -40,6 +40,7 @@ from pipeline.status import FrameStatus, InputError, StageError
 from pipeline.study.manifest import read_manifest
 from pipeline.study.parameters import ParametersError, read_parameters
 from pipeline.study.settings import Config
+from reports.calibration import to_its_digits
 from solver import Grid, VesselWall
 from tests.pipeline.test_manifest import GOOD, written
 
@@ -402,6 +403,34 @@ def test_the_verb_refuses_what_it_cannot_use(study, capsys):
     assert "no such file; wireval calibrate" in capsys.readouterr().err
 
 
+def test_a_plan_that_is_calibrated_is_told_of_design(study, capsys):
+    """It had "0 of 14 frames with a trace", as if scans were bad."""
+    manifest = study / "manifest.toml"
+    text = manifest.read_text(encoding="utf-8")
+    text = re.sub(r"(?m)^(frames|traces) = .*$", "", text)
+    manifest.write_text(text, encoding="utf-8")
+    assert main(["calibrate", str(manifest), "-o", str(study / "out")]) == 2
+    said = capsys.readouterr().err
+    assert "a: left out: it has neither frames nor traces to fit to" in said
+    assert "predicted with --design" in said
+
+
+@pytest.mark.parametrize(
+    ("value", "sd", "logarithmic", "said"),
+    [
+        (1.03712, 0.1, True, "1.04"),
+        (1.03712, 0.0123, True, "1.037"),
+        (12.3456, 0.0999, False, "12.35"),
+        (-0.001, 0.3, False, "0.00"),
+        (1234.5, 250.0, False, "1230"),
+        (0.5, 0.0, False, "0.500"),
+    ],
+)
+def test_a_value_has_the_digits_that_its_standard_deviation_leaves(value, sd, logarithmic, said):
+    """1.03712 +- 10 %: five digits of which three say nothing."""
+    assert to_its_digits({"value": value, "sd": sd, "logarithmic": logarithmic}, "value") == said
+
+
 def test_the_verb_writes_what_it_reads(study, capsys):
     assert main(["calibrate", str(study / "manifest.toml"), "-o", str(study / "out"), "--no-cache"]) == 0
     found = read_parameters(study / "out" / "parameters.toml")
@@ -524,8 +553,8 @@ def test_how_well_a_factor_is_known_is_said_in_per_cent_or_as_a_factor() -> None
     free = {u.name: u for u in unknowns([], 0.0, weighed=False)}
     fit: Any = SimpleNamespace(values={TAPER: 0.0, FRICTION: 0.0}, sd={TAPER: 1.034, FRICTION: 0.0754})
     said = [_judged(free[name], fit, ()).why for name in (TAPER, FRICTION)]
-    assert said[0] == "known to a factor of 2.81 only; 20 % or less counts as seen"
-    assert said[1] == "known to 0.0754 only; 0.02 or less counts as seen"
-    assert spread_in_words(0.2951, logarithmic=True) == "29.5 %"
-    assert spread_in_words(1.4, logarithmic=True) == "a factor of 4.06"
+    assert said[0] == "known to a factor of 2.8 only; 20 % or less counts as seen"
+    assert said[1] == "known to 0.075 only; 0.02 or less counts as seen"
+    assert spread_in_words(0.2951, logarithmic=True) == "30 %"
+    assert spread_in_words(1.4, logarithmic=True) == "a factor of 4.1"
     assert spread_in_words(1234.5, logarithmic=False) == "1234"  # it was 1e+03

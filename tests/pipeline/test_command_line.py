@@ -98,6 +98,9 @@ TOO_LONG = (
         ("cache --limit -1G", "--limit: its value is missing (one that begins with - is written --limit=-VALUE)"),
         ("run STUDY -o EMPTY", "an empty argument"),
         ("run STUDY -o y -j x", "-j 'x': expected a whole number"),
+        ("run STUDY -o y --case-timeout 1m", "--case-timeout '1m': expected a number of seconds, as 60"),
+        ("run STUDY -o y --case-memory 2G", "--case-memory '2G': expected a number of MiB, as 2048"),
+        ("score STUDY -o y --curve mine=x", "--curve: not an option of wireval score; did you mean '--curves'?"),
         ("run STUDY -o y -q -v", "-v and -q: give one of them"),
         ("run STUDY -o y --resume --fresh", "--resume and --fresh: keep what fits, or compute again"),
         ("run STUDY -o y --entry 1,2,3", "--entry: of a folder of scans"),
@@ -412,7 +415,7 @@ def test_a_reader_that_has_gone_does_not_change_the_exit_code(study: Path, tmp_p
 def test_each_gate_is_a_test(study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     words = ["run", str(study), "-o", str(tmp_path / "out"), "--until", "load", "--junit", str(tmp_path / "x.xml")]
     assert main([*words, "--fail-if", "rms_mm>0.5"]) == 1
-    assert "gate closed: --fail-if rms_mm>0.5" in capsys.readouterr().err
+    assert "\nFAIL: gate closed: --fail-if rms_mm>0.5" in f"\n{capsys.readouterr().err}"
     suite = ET.parse(tmp_path / "x.xml").getroot().findall("testsuite")[-1]
     assert (suite.get("name"), suite.get("tests"), suite.get("failures")) == ("gates", "1", "1")
     assert "gate closed" in str(suite[0][0].get("message"))

@@ -75,11 +75,30 @@ def test_the_wires_of_another_simulator_are_one_input(study: Path, tmp_path: Pat
     result = json.loads(path.read_text(encoding="utf-8"))
     wires = [{"key": f"simulated.files[{n}]", "path": f"w{n}.csv", "sha256": f"{n}" * 64} for n in range(2)]
     path.write_text(json.dumps(result | {"inputs": [*result["inputs"], *wires]}), encoding="utf-8")
-    differs = what_differs(tmp_path / "before", tmp_path / "after")
-    (row,) = differs
+    (row,) = what_differs(tmp_path / "before", tmp_path / "after")
     assert (row["what"], row["before"]) == ("input of a: simulated.files", "(none)")
     assert row["after"].startswith("2 files, ")
-    assert of_two_simulators(differs)
+    assert of_two_simulators(tmp_path / "before", tmp_path / "after")
+
+
+def test_a_simulator_that_wrote_nothing_for_one_case_is_still_the_same(study: Path, tmp_path: Path) -> None:
+    """After a crash half-way the wires of one run "are the solver's own", since a case of it had no file."""
+    runs = [tmp_path / name for name in ("before", "after")]
+    for out in runs:
+        run(study, out)
+        for name in "ab" if out.name == "before" else "a":
+            path = out / "cases" / name / "result.json"
+            result = json.loads(path.read_text(encoding="utf-8"))
+            wires = [{"key": "simulated.files[0]", "path": "w.csv", "sha256": "0" * 64}]
+            path.write_text(json.dumps(result | {"inputs": [*result["inputs"], *wires]}), encoding="utf-8")
+    assert [row["what"] for row in what_differs(*runs)] == ["input of b: simulated.files"]
+    assert of_two_simulators(*runs) == ""
+    # of one case alone a score's results say whose the wires are
+    for out in runs:
+        shutil.rmtree(out / "cases" / "a")
+        path = out / "cases" / "b" / "result.json"
+        path.write_text(json.dumps(json.loads(path.read_text(encoding="utf-8")) | {"simulator": "mine"}), "utf-8")
+    assert of_two_simulators(*runs) == ""
 
 
 def test_given_parameters_are_told_by_their_content(study: Path, tmp_path: Path) -> None:

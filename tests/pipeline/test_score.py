@@ -174,6 +174,34 @@ def test_any_simulator_s_failure_is_the_exit_code(known: Known, tmp_path: Path) 
         assert (out / table["log"].item()).exists()
 
 
+@pytest.mark.usefixtures("undrawn")
+def test_a_case_without_a_folder_has_failed_and_the_others_count(
+    known: Known, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A simulator that crashed in one case wrote no folder for it: exit 2, and no summary for the build server."""
+    manifest = known[0].with_name("two.toml")
+    text = known[0].read_text(encoding="utf-8")
+    case = text[text.index("[[case]]") :].replace('id = "bend"', 'id = "lost"')
+    manifest.write_text(f"{text}\n{case}", encoding="utf-8")
+    write_csv(tmp_path / "sim" / "bend", known[1])
+    out, junit = tmp_path / "out", tmp_path / "junit.xml"
+    words = ["score", str(manifest), "-o", str(out), *QUICK]
+    assert main([*words, "--curves", f"mine={tmp_path / 'sim'}", "--junit", str(junit)]) == 1
+    assert f"warning: mine: {tmp_path / 'sim'} has no folder CASE/ nor CASE.h5 for lost" in capsys.readouterr().err
+    table = pd.read_csv(out / "failures.csv")
+    assert set(zip(table["simulator"], table["case"], table["status"], strict=True)) == {
+        ("mine", "lost", "curve_missing")
+    }
+    suites = {suite.get("name"): suite.get("failures") for suite in ElementTree.parse(junit).getroot()}
+    assert (suites["mine/bend"], suites["mine/lost"]) == ("0", str(FRAMES))
+    took = pd.read_csv(out / "cases" / "bend" / "timings.csv").set_index("frame")["compare_s"][0]
+    (first,) = ElementTree.parse(junit).findall("testsuite[@name='mine/bend']/testcase[@name='frame 0']")
+    assert float(str(first.get("time"))) == pytest.approx(took, abs=1e-3), "of a frame that is timed"
+    (tmp_path / "sim" / "bend").rename(tmp_path / "sim" / "bent")
+    assert main([*words, "--curves", f"mine={tmp_path / 'sim'}"]) == 2
+    assert "found neither bend/ nor bend.h5 in it" in capsys.readouterr().err
+
+
 ENTRY, ALONG = np.array([10.0, -40.0, 7.0]), np.array([0.0, 0.6, 0.8])
 
 
@@ -231,6 +259,9 @@ def test_a_unit_that_a_file_states_wrongly_is_told_as_it_is(tmp_path: Path) -> N
     assert found.points_mm is not None
     assert oddity(found.points_mm, ENTRY, ALONG, found.unit).endswith("it would if it were in mm, not in m")
     assert not_to_depth(40e3, 40.0, 2.0, found.unit).endswith("is it in mm?")
+    assert not_to_depth(4.0, 40.0, 2.0).endswith("is it in cm?")
+    assert not_to_depth(4.0, 40.0, 2.0, others_fit=True).endswith("does its file end early?"), "a unit would be of all"
+    assert not_to_depth(36.0, 40.0, 2.0, others_fit=True).endswith("40.00 mm deep")
 
 
 def test_a_reading_that_only_just_passes_is_none() -> None:
@@ -389,6 +420,7 @@ def test_bad_frames_fail_and_the_others_count(known: Known, tmp_path: Path) -> N
     assert code == 1
     assert list(table["status"]) == ["ok", "curve_missing", "curve_missing", "not_to_depth"]
     assert "wire_003.csv: it is" in str(result["failures"])
+    assert "deep: does its file end early?" in str(result["failures"]), "it was asked whether the file is in cm"
     assert pd.DataFrame([result["summary"]])["frames_ok"].item() == 1
     for number, text in ((1, "a,b\n1,2\n"), (2, "x,y,z\n0,0,0\n0,0,1\n"), (3, "\0\1\2")):
         (tmp_path / "odd" / f"wire_00{number}.csv").write_text(text, encoding="utf-8")
@@ -523,6 +555,15 @@ def test_a_score_of_others_is_not_replaced(known: Known, tmp_path: Path, capsys:
     assert "holds a score of one, which would be replaced; name another folder" in capsys.readouterr().err
     assert (tmp_path / "out" / "simulators.csv").read_bytes() == kept
     assert main([*words, "--curves", str(one), "--curves", str(two)]) == 0
+    # nor by another folder under the same name, or with other settings: run refuses that, too
+    assert main([*words, "--curves", f"one={two}", "--curves", f"two={one}"]) == 2
+    told = f"it holds a score of one by the wires in {one.resolve()}, which would be replaced by that of those in {two}"
+    assert told in capsys.readouterr().err
+    assert main([*words, "--curves", str(one), "--curves", str(two), "--set", "compare.skip_mm=3"]) == 2
+    assert "was scored with other settings: compare.skip_mm" in capsys.readouterr().err
+    write_csv(one, [wire + [0.0, 0.01, 0.0] for wire in known[1]])
+    assert main([*words, "--curves", str(one), "--curves", str(two)]) == 0, "the same wires, mended"
+    assert main([*words, "--curves", f"one={two}", "--curves", f"two={one}", "--fresh"]) == 0
 
 
 @pytest.mark.parametrize("names", [("sofa", "SOFA"), ("Wireval",)])

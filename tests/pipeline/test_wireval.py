@@ -82,6 +82,11 @@ def test_a_run_gives_frames(study: Path, tmp_path: Path) -> None:
     assert not again.ok, "a closed gate was seen on the terminal alone"
     assert len(again.closed) == 1
     assert "--fail-if rms_mm>0.001" in again.closed[0]
+    rms_mm = results.errors["rms_mm"]
+    worst = (
+        f"; the worst: case straight frame {rms_mm.argmax()} (rms_mm {rms_mm.max():.4g}), cases/straight/report.html"
+    )
+    assert again.closed[0].endswith(worst), "the number is of all frames: where to look was not said"
     assert wireval.read_results(tmp_path / "out").closed == again.closed, "nor did a later reader see it"
     page = (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
     assert "gate closed</span>" in page, "the page was green"

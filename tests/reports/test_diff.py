@@ -91,7 +91,7 @@ def test_missing_frames_and_cases_are_regressions_and_new_ones_are_not() -> None
     assert bad == [["a", "frame", "missing"], ["b", "case", "missing"]]
     assert found.rows[found.rows["verdict"] == "new"]["case"].tolist() == ["c"]
     assert found.sentence.startswith(
-        "1 of 3 cases compared: 2 regressions; the worst: case a frame 1, frame present -> missing"
+        "1 of 3 cases compared: 1 of 2 frames and 1 case worse; the worst: case a frame 1, frame present -> missing"
     )
 
 
@@ -186,3 +186,47 @@ def test_what_the_second_run_has_in_no_frame_has_moved() -> None:
         part = diff.diff_tables({"c": before}, {"c": some}, tolerance)
         assert part.lacking == []
         assert part.regressions["column"].tolist() == [column]
+
+
+def test_errors_stand_before_what_is_none() -> None:
+    """An overlap of 1.1 times what is allowed was named the worst, above a tip of another branch."""
+    tolerance = {"max_penetration_mm": 0.02, "rms_mm": 0.1, "skill": 0.01}
+    before = _table([_row(frame=n, max_penetration_mm=0.1) for n in range(3)])
+    after = _table([_row(frame=n, max_penetration_mm=0.9, rms_mm=0.61, skill=0.1) for n in range(2)])
+    found = diff.diff_tables({"c": before}, {"c": after}, tolerance)
+    assert found.regressions["column"].tolist()[:3] == ["frame", "rms_mm", "rms_mm"]
+    assert "3 of 3 frames worse, in 7 values; the worst: case c frame 2, frame present -> missing" in found.sentence
+    alone = diff.diff_tables({"c": before}, {"c": _table([_row(max_penetration_mm=0.2)])}, {"max_penetration_mm": 0.02})
+    assert not alone.beside_errors, "frames are missing"
+
+
+def test_an_overlap_is_held_against_its_own_size() -> None:
+    """0.3903 -> 0.4122 mm in one frame closed the gate on a change of all errors that is allowed."""
+    tolerance, shown = load_tolerance(), {}
+    for was, now in ((0.3903, 0.4122), (0.3903, 0.4322), (0.01, 0.029), (0.01, 0.031)):
+        pair = [{"c": _table([_row(max_penetration_mm=value)])} for value in (was, now)]
+        shown[was, now] = diff.diff_tables(*pair, tolerance)
+    assert [len(found.regressions) for found in shown.values()] == [0, 1, 0, 1]
+    found = shown[0.3903, 0.4322]
+    assert found.beside_errors
+    assert (
+        "max_penetration_mm 0.3903 -> 0.4322 (allowed 0.03903); no error of a simulated wire is worse" in found.sentence
+    )
+
+
+def test_a_share_is_of_a_column_that_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "t.toml"
+    path.write_text("rms_mm = 0.1\n[share]\nrms_mm = 0.5", encoding="utf-8")
+    tolerance = load_tolerance(path)
+    assert [
+        len(diff.diff_tables({"c": _table([_row(rms_mm=1.0)])}, {"c": _table([_row(rms_mm=v)])}, tolerance).regressions)
+        for v in (1.4, 1.6)
+    ] == [0, 1]
+    for text in (
+        "rms_mm = 0.1\n[share]\ntip_mm = 0.5",
+        "rms_mm = 0.1\nshare = 0.5",
+        "rms_mm = 1\n[share]\nrms_mm = -1",
+    ):
+        path.write_text(text, encoding="utf-8")
+        with pytest.raises(ValueError, match=r"share.*a number from 0 up for a column that has a line above"):
+            load_tolerance(path)

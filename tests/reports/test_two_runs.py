@@ -70,6 +70,7 @@ def test_the_same_twice_is_not_worse(first: Path, capsys: pytest.CaptureFixture[
     assert said.splitlines()[0] == "Nothing differs in settings, code and inputs."
     assert "the error of no validation frame changed" in said
     assert said.splitlines()[-1].startswith("not worse")
+    assert said.endswith(": PASS, exit 0, the gate stays open\n")
 
 
 def test_what_is_not_known_to_be_the_same_is_not_called_so(first: Path, second: Path, tmp_path: Path) -> None:
@@ -141,8 +142,14 @@ def test_the_verdict_follows_what_differs_and_ends_the_text(
     heads = ["What differs between the runs:", "Verdict: WORSE.", "What became worse:", "Frame by frame:"]
     places = [said.index(head) for head in heads]
     assert places == sorted(places)
-    assert said.splitlines()[-1].startswith("WORSE: 3 cases compared: 2 regressions; the worst: case b frame 2, tip_mm")
-    assert said.endswith("exit 1, the gate closes\n")
+    assert said.splitlines()[-1].startswith(
+        "WORSE: 3 cases compared: 2 of 9 frames worse; the worst: case b frame 2, tip_mm"
+    )
+    assert said.endswith(": FAIL, exit 1, the gate closes\n")
+    (verdict,) = [line for line in said.splitlines() if line.startswith("Verdict:")]
+    assert re.search(
+        r"closes the gate, the worst first: case b frame 2, tip_mm \S+ -> \S+ \(allowed 0.1\)\. Pooled", verdict
+    )
 
 
 def test_one_number_that_became_worse_does_not_hide_that_the_errors_are_smaller(
@@ -156,7 +163,10 @@ def test_one_number_that_became_worse_does_not_hide_that_the_errors_are_smaller(
     tables.write(path, ERRORS, rows)
     assert main(["diff", str(first), str(second), "-q"]) == 1
     said = capsys.readouterr().out
-    assert said.startswith("WORSE: 3 cases compared: 1 regression; the worst: case b frame 1, max_penetration_mm")
+    assert said.startswith(
+        "WORSE: 3 cases compared: 1 of 9 frames worse; the worst: case b frame 1, max_penetration_mm"
+    )
+    assert "no error of a simulated wire is worse than is allowed" in said
     assert said.endswith("; but over all frames the errors are 0.3 times those of the first run\n")
 
 
@@ -263,6 +273,25 @@ def test_what_is_missing_is_worse(first: Path, second: Path, tmp_path: Path) -> 
     assert [f.text for f in ET.parse(junit).findall(".//failure")] == ["case: present -> missing"]
 
 
+def test_a_build_server_shows_the_worst_column_with_what_is_allowed(first: Path, second: Path, tmp_path: Path) -> None:
+    """The message was of whichever column the tolerance names first, and said neither unit nor limit."""
+    before, junit = shutil.copytree(first, tmp_path / "before"), tmp_path / "diff.xml"
+    path = second / "cases" / "b" / ERRORS.file
+    rows = tables.read(path, ERRORS).assign(tip_mm=0.5, skill=0.9)
+    tables.write(before / "cases" / "b" / ERRORS.file, ERRORS, rows)
+    rows.loc[2, ["rms_mm", "tip_mm", "skill", "insertion_mm"]] += [0.04, 3.0, -0.5, 9.0]
+    tables.write(path, ERRORS, rows)
+    assert main(["diff", str(before), str(second), "--junit", str(junit)]) == 1
+    (failure,) = ET.parse(junit).findall(".//failure")
+    assert failure.get("message") == "tip_mm: 0.5 -> 3.5 mm (allowed 0.1 mm more)"
+    assert str(failure.text).splitlines()[1:] == [
+        *[line for line in str(failure.text).splitlines() if line.startswith("rms_mm")],
+        "skill: 0.9 -> 0.4 (allowed 0.03 less)",
+        *[line for line in str(failure.text).splitlines() if line.startswith("insertion_mm") and "either way" in line],
+    ]
+    assert all(float(str(test.get("time"))) == 0.0 for test in ET.parse(junit).iter("testcase"))
+
+
 def test_golden_tables_alone_are_enough(
     first: Path, second: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -275,6 +304,8 @@ def test_golden_tables_alone_are_enough(
     said = capsys.readouterr().out
     assert "over all frames nothing is judged: no frame has points in both runs" in said.splitlines()[-1]
     assert said.count("(not kept)") == 1, "one row, not one a setting"
+    assert "settings, code and inputs: not compared" in said
+    assert "of this run there are tables alone, without result.json" in said
     for name in GROUPS:
         shutil.copy(first / "cases" / name / POINTS.file, tmp_path / "golden" / "cases" / name)
     assert main(["diff", str(tmp_path / "golden"), str(second)]) == 1
@@ -394,6 +425,22 @@ def test_two_scores_are_compared_simulator_by_simulator(
     capsys.readouterr()
     assert main(["diff", str(scores[0]), str(scores[0])]) == 0
     assert capsys.readouterr().out.startswith("Nothing differs in settings, code and inputs.")
+
+
+def test_what_holds_for_one_simulator_is_not_said_of_all(
+    first: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Above stood the ratio of one on all frames, in the last line that no frame has points: of the other."""
+    scores = [shutil.copytree(first, tmp_path / name) for name in ("old", "new")]
+    for score in scores:
+        tables.write(score / SIMULATORS.file, SIMULATORS, [{"simulator": name} for name in ("mine", "wireval")])
+        shutil.copytree(first, score / "simulators" / "wireval")
+    shutil.rmtree(scores[1] / "simulators" / "wireval" / "cases")
+    assert main(["diff", *map(str, scores)]) == 1
+    said = capsys.readouterr().out.splitlines()[-1]
+    assert re.search(
+        "; wireval: [^;]*(; )?[^;]*over all frames nothing is judged: no frame has points in both runs", said
+    )
 
 
 @pytest.mark.parametrize(
@@ -541,3 +588,16 @@ def test_wires_that_were_made_from_the_traces_pass_no_gate(
     times(second, 3.0)
     assert main(["diff", str(first), str(second)]) == 1
     assert "Verdict: WORSE" in capsys.readouterr().out
+
+
+def test_a_quiet_report_prints_the_result_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """All other verbs that take long had -q, and a script had to know which does not."""
+    monkeypatch.setattr("pipeline.run.case.draw", lambda *_: None)
+    out = write_run(tmp_path / "out", tuple(FakeCase(f"c{n}", frames=1, seed=n) for n in range(10)))
+    assert main(["report", str(out)]) == 0
+    assert capsys.readouterr().err.count(": drawn\n") == 10
+    assert main(["report", str(out), "-q"]) == 0
+    heard = capsys.readouterr()
+    assert (heard.err, heard.out.count("\n")) == ("", 1)

@@ -41,7 +41,9 @@ def frames_of_others(run: Context, known: Known) -> tuple[Frame, ...]:
     assert case.simulated is not None
     with log.timed("simulate"):
         files = read_wires(case.simulated.files, len(known.frames), case.simulated.space, case.simulated.unit)
-        frames = [_taken(run, known, frame, file) for frame, file in zip(known.frames, files, strict=True)]
+        pairs = list(zip(known.frames, files, strict=True))
+        fit = {file.unit for frame, file in pairs if _fits(run, known, frame, file)}
+        frames = [_taken(run, known, frame, file, others_fit=file.unit in fit) for frame, file in pairs]
     log.assumptions.append(
         f"the simulated wires are another simulator's: {_listed(files)}; their depth counts from the clamp's plane"
     )
@@ -77,7 +79,15 @@ def _in_another_order(frames: Sequence[Frame]) -> list[str]:
     ]
 
 
-def _taken(run: Context, known: Known, frame: Frame, file: OtherFile) -> Frame:
+def _fits(run: Context, known: Known, frame: Frame, file: OtherFile) -> bool:
+    """Whether a wire is as long as its frame is deep."""
+    if file.points_mm is None:
+        return False
+    length = float(arc_length(begun(file.points_mm, known.held.entry_mm, known.held.direction))[-1])
+    return abs(length - frame.depth_mm) <= run.config.trace.length_tolerance_mm
+
+
+def _taken(run: Context, known: Known, frame: Frame, file: OtherFile, *, others_fit: bool) -> Frame:
     case, clamp = run.case, known.held
     if file.points_mm is None:
         status = FrameStatus.CURVE_MISSING if file.missing else FrameStatus.CURVE_UNUSABLE
@@ -92,7 +102,7 @@ def _taken(run: Context, known: Known, frame: Frame, file: OtherFile) -> Frame:
     radius = case.wire.radius_mm
     found = not_in_itself(found, self_overlap_mm(points, radius), radius, f"{file.name}: the wire")
     length = float(arc_length(points)[-1])
-    wrong = not_to_depth(length, frame.depth_mm, run.config.trace.length_tolerance_mm, file.unit)
+    wrong = not_to_depth(length, frame.depth_mm, run.config.trace.length_tolerance_mm, file.unit, others_fit=others_fit)
     return found.failed("simulate", FrameStatus.NOT_TO_DEPTH, f"{file.name}: {wrong}") if wrong else found
 
 
