@@ -17,6 +17,7 @@ from pipeline.run.log import Log
 from pipeline.run.projections import grey_window, projections
 from pipeline.run.stages.before import NOTHING, Before
 from pipeline.run.stages.beside import beside_what_is_seen
+from pipeline.run.stages.brightness import of_another_brightness
 from pipeline.run.stages.depths import (
     in_another_order,
     in_step,
@@ -70,6 +71,7 @@ def trace_frames(run: Context, known: Known) -> Known:
     run.log.warnings += [*faint_ends(frames), *alike(frames), *rescanned(frames, run.case.calibrated_traces)]
     run.log.warnings += barely_seen(frames) if run.case.wire.opacity is None else []
     run.log.warnings += too_thin(frames, known.vessel, run.case.wire.radius_mm)
+    run.log.warnings += of_another_brightness(frames, run.case.wire.radius_mm)
     if not given:
         run.log.warnings += cut_off(trusted(frames))
     run.log.warnings += beside_what_is_seen(frames, [part.seen for part in parts], run.config.trace, voxel_mm)
