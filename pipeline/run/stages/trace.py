@@ -10,7 +10,8 @@ from pipeline.arrays.fingerprint import known_by
 from pipeline.arrays.grids import corners_mm
 from pipeline.load import Crop, Header
 from pipeline.model import Curve, Lumen, Volume
-from pipeline.register import Motion
+from pipeline.register import Anchor, Motion, anchor
+from pipeline.register.drift import of_drift, with_drift
 from pipeline.register.frames import Alignment, alignment_of, counters_of, put_in_place, sentences_of, widened
 from pipeline.run.helpers import Earlier
 from pipeline.run.log import Log
@@ -70,8 +71,8 @@ def trace_frames(run: Context, known: Known) -> Known:
     frames = _in_step(run, turned_round(frames), voxel_mm)
     run.log.warnings += [*faint_ends(frames), *alike(frames), *rescanned(frames, run.case.calibrated_traces)]
     run.log.warnings += barely_seen(frames) if run.case.wire.opacity is None else []
-    run.log.warnings += too_thin(frames, known.vessel, run.case.wire.radius_mm)
-    run.log.warnings += of_another_brightness(frames, run.case.wire.radius_mm)
+    radius_mm = run.case.wire.radius_mm
+    run.log.warnings += [*too_thin(frames, known.vessel, radius_mm), *of_another_brightness(frames, radius_mm)]
     if not given:
         run.log.warnings += cut_off(trusted(frames))
     run.log.warnings += beside_what_is_seen(frames, [part.seen for part in parts], run.config.trace, voxel_mm)
@@ -79,7 +80,7 @@ def trace_frames(run: Context, known: Known) -> Known:
     run.log.warnings += _in_plane(frames, run.config.trace)
     assumed, doubtful = sentences_of(work.alignment, {frame.index: frame.registration for frame in frames})
     run.log.assumptions += assumed
-    run.log.warnings += doubtful
+    run.log.warnings += doubtful + of_drift({f.index: f.curve for f in frames if f.curve is not None})
     return _with_room(run, known, frames)
 
 
@@ -148,6 +149,19 @@ class _Tracing:
         """A warning where the reference shows a wire, too."""
         return wire_in_reference(self.run, self.reference, self.lumen)
 
+    @cached_property
+    def first(self) -> Anchor | None:
+        """What tells whether the phantom moved since the first frame; None where frames are registered or need not be.
+
+        No file is counted as read once more for it.
+        """
+        if self.reference is not None or self.given or self.run.config.trace.register != "auto":
+            return None
+        try:
+            return anchor(Crop(self.headers[0], self.box, self.load).load(), self.lumen)
+        except StageError:  # said where it is read to be traced
+            return None
+
     def meanwhile(self) -> None:
         """Make what is needed soon, while helpers trace; the wall takes a second and more with 256^3 voxels."""
         if self.run.goes_to("simulate"):
@@ -185,6 +199,9 @@ class _Tracing:
         log.count("trace", counters_of(registration))
         frame = replace(frame, registration=registration, voxels=known_by(volume))
         seen = widened(self.follow(run, frame, here, earlier), registration)
+        if frame.index:
+            with log.timed("trace", frame.index):
+                seen = with_drift(seen, volume, self.first)
         done = _of_scan(run, frame, seen, self.lumen)
         if self.given:
             done = as_given(run, frame, self.given[frame.index], self.lumen.distance)
