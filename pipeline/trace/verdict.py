@@ -232,7 +232,7 @@ def _of_the_line(
          f"{least_cnr:.1f} where it is so long, or the curve of the frame before, confirmed by this one",
          "check that the frame shows a wire; scan with more dose or list a frame of a smaller depth before it"),
         (outside.mean() > MOST_OUTSIDE, FrameStatus.TRACE_LEFT_LUMEN,
-         f"{100 * outside.mean():.0f} % of the curve over 2 voxels outside the lumen",
+         f"{100 * outside.mean():.3g} % of the curve over 2 voxels outside the lumen",
          f"{100 * MOST_OUTSIDE:.0f} % at most", "check the lumen, and whether the phantom moved between the scans"),
         (left_mm > most_mm, FrameStatus.TRACE_AMBIGUOUS,
          f"{left_mm:.1f} mm of bright line off the curve", f"{most_mm:.1f} mm at most",

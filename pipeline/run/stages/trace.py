@@ -1,5 +1,6 @@
 """trace: the real wire of every frame, one crop held at a time."""
 
+from collections.abc import Collection
 from dataclasses import replace
 from functools import cached_property
 from typing import NamedTuple
@@ -17,7 +18,7 @@ from pipeline.run.helpers import Earlier
 from pipeline.run.log import Log
 from pipeline.run.projections import grey_window, projections
 from pipeline.run.stages.before import NOTHING, Before
-from pipeline.run.stages.beside import beside_what_is_seen
+from pipeline.run.stages.beside import beside_what_is_seen, elsewhere
 from pipeline.run.stages.brightness import of_another_brightness
 from pipeline.run.stages.depths import (
     in_another_order,
@@ -75,13 +76,14 @@ def trace_frames(run: Context, known: Known) -> Known:
     run.log.warnings += [*too_thin(frames, known.vessel, radius_mm), *of_another_brightness(frames, radius_mm)]
     if not given:
         run.log.warnings += cut_off(trusted(frames))
-    run.log.warnings += beside_what_is_seen(frames, [part.seen for part in parts], run.config.trace, voxel_mm)
+    seen = [part.seen for part in parts]
+    run.log.warnings += beside_what_is_seen(frames, seen, run.config.trace, voxel_mm)
     run.log.warnings += work.wire_in_reference
     run.log.warnings += _in_plane(frames, run.config.trace)
     assumed, doubtful = sentences_of(work.alignment, {frame.index: frame.registration for frame in frames})
     run.log.assumptions += assumed
     run.log.warnings += doubtful + of_drift({f.index: f.curve for f in frames if f.curve is not None})
-    return _with_room(run, known, frames)
+    return _with_room(run, known, frames, elsewhere(frames, seen, run.config.trace, voxel_mm))
 
 
 def _in_step(run: Context, frames: list[Frame], voxel_mm: float) -> list[Frame]:
@@ -101,10 +103,10 @@ def _in_step(run: Context, frames: list[Frame], voxel_mm: float) -> list[Frame]:
     return frames
 
 
-def _with_room(run: Context, known: Known, frames: list[Frame]) -> Known:
-    """The case with its frames, and a lumen that has room for their traces."""
-    wire, wall = run.case.wire, run.case.wall
-    curves, given = [*trusted(frames).values()], run.case.lumen is not None
+def _with_room(run: Context, known: Known, frames: list[Frame], doubted: Collection[int] = ()) -> Known:
+    """The case with its frames, and a lumen that has room for their traces, but for those of doubted numbers."""
+    wire, wall, given = run.case.wire, run.case.wall, run.case.lumen is not None
+    curves = [curve for number, curve in trusted(frames).items() if number not in doubted]
     lumen = opened(known.vessel, curves, wire.radius_mm, wall.stiffness_N_mm2, given=given)
     run.log.warnings += lumen.warnings[len(known.vessel.warnings) :]
     run.lumen_known(lumen)
