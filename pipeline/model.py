@@ -210,6 +210,8 @@ class Curve:
     in_plane : (n,) bool, points where the wire runs nearly in the plane of the scanner's rotation.
     elsewhere_mm : (m, 3) points of bright lines off the curve.
     marks_mm : (k, 3) points as bright as the wire in the lumen beyond the curve's end.
+    brightness : (n,) the line's grey above its background, summed across it, grey mm2; contrast : grey of the scan in
+    the lumen above that around it. Empty and NaN where no scan was traced.
     """
 
     points_mm: Array
@@ -223,10 +225,12 @@ class Curve:
     levels: Levels = field(default_factory=dict)
     elsewhere_mm: Array = field(default_factory=lambda: np.zeros((0, 3)))
     marks_mm: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    brightness: Array = field(default_factory=lambda: np.zeros(0))
+    contrast: float = float("nan")
 
     def __post_init__(self) -> None:
         """Freeze the arrays."""
-        for name in ("points_mm", "sigma_mm", "elsewhere_mm", "marks_mm"):
+        for name in ("points_mm", "sigma_mm", "elsewhere_mm", "marks_mm", "brightness"):
             object.__setattr__(self, name, read_only(getattr(self, name), np.float64))
         for name in ("flagged", "in_plane"):
             marks = getattr(self, name)

@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pipeline.load import dicom, files, hdf5
+from pipeline.load.common import on_common_box
+from pipeline.load.common import told as told_of_crops
 from pipeline.load.config import LoadConfig
 from pipeline.load.geometry import Box, Header, LoadError, Source, judged, require_same_geometry, unusable
 from pipeline.load.guard import is_folder, size_of, told
@@ -89,7 +91,7 @@ def load(header: Header, box: Box | None = None, config: LoadConfig = LoadConfig
     """Voxels of a scan, indexed x, y, z, with its geometry; of ``box`` alone where one is given."""
     start, stop = box or header.box
     with told(header.source):
-        values = plain(_format_of(header.source.path).read(header, (start, stop), config), header.source)
+        values = plain(_read(header, (start, stop), config), header.source)
     if values.dtype.kind == "f" and not np.all(np.isfinite(values)):
         bad = int(np.size(values) - np.isfinite(values).sum())
         why = f"{bad} voxels are NaN or infinite; allowed: finite grey values. Replace them first."
@@ -97,6 +99,13 @@ def load(header: Header, box: Box | None = None, config: LoadConfig = LoadConfig
     made_of = Crop(header, (start, stop), config)
     origin = header.grid.to_mm(start)
     return Volume(read_only(values), header.spacing_mm, origin, header.direction, header.assumed, made_of)
+
+
+def _read(header: Header, box: Box, config: LoadConfig) -> NDArray[Any]:
+    """Voxels of a box as the file holds them; of a scan that is cut out of it, counted from where that begins."""
+    whole = header.whole or header
+    (a, b, c), (d, e, f), (x, y, z) = *box, header.first
+    return _format_of(header.source.path).read(whole, ((a + x, b + y, c + z), (d + x, e + y, f + z)), config)
 
 
 @dataclass(frozen=True)
@@ -147,9 +156,16 @@ class Scans:
         return next(iter(self.all), None)
 
     @property
+    def cut(self) -> "Scans":
+        """The same, of the box that all scans show where they are crops of one grid."""
+        cut = on_common_box(self.all)
+        return Scans(cut[0] if self.reference else None, tuple(cut[1:] if self.reference else cut))
+
+    @property
     def assumed(self) -> tuple[str, ...]:
         """What was assumed where the files lack something, each listed once."""
-        return tuple(dict.fromkeys(text for header in self.all for text in header.assumed))
+        each = (text for header in self.all for text in header.assumed)
+        return (*dict.fromkeys(each), *told_of_crops(self.all))
 
 
 def each_volume(header: Header) -> Iterator[Header]:
@@ -175,12 +191,15 @@ def require_one(header: Header) -> None:
 def read_headers(
     reference: Source | None, frames: Sequence[Source], config: LoadConfig, spacing_mm: ArrayLike | None = None
 ) -> Scans:
-    """Headers of a case's scans; raises LoadError where one is unusable or its geometry differs from the first's."""
+    """Headers of a case's scans, those of crops of one grid cut to the box that all show.
+
+    Raises LoadError where one is unusable or its geometry differs from the first's.
+    """
     empty = read_header(reference, config, spacing_mm) if reference else None
     if empty is not None:
         require_one(empty)
     headers = [read_header(source, config, spacing_mm) for source in frames]
-    scans = Scans(empty, tuple(volume for header in headers for volume in each_volume(header)))
+    scans = Scans(empty, tuple(volume for header in headers for volume in each_volume(header))).cut
     for header in scans.frames:
         require_same_geometry(scans.all[0], header)
     return scans

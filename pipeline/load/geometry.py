@@ -12,6 +12,8 @@ from solver.grid import Grid
 
 SAME_VOXELS = 0.5
 """Anything less between two scans is rounding in a header (1e-8 in a direction is common), harmonised silently."""
+LEAST_TURN_DEG = 0.05
+"""Turn of the axes that is said: over 500 voxels it moves the last one by half a voxel."""
 Box = tuple[tuple[int, int, int], tuple[int, int, int]]
 """First voxel (inclusive) and last voxel (exclusive) along x, y, z."""
 
@@ -60,7 +62,8 @@ class Header:
     """Geometry and type of a scan, read without its voxels.
 
     shape : voxels along x, y, z.     spacing_mm, origin_mm : (3,).     direction : (3, 3), columns are the axes.
-    item_count : volumes in the file (> 1 for a sequence).
+    item_count : volumes in the file (> 1 for a sequence).     whole : of all that the file holds, where this is of a
+    box of it alone, which begins at the voxel ``first`` there.
     """
 
     source: Source
@@ -71,6 +74,8 @@ class Header:
     pixel_type: str
     item_count: int = 1
     assumed: tuple[str, ...] = ()
+    whole: "Header | None" = None
+    first: tuple[int, int, int] = (0, 0, 0)
 
     @property
     def grid(self) -> Grid:
@@ -130,16 +135,36 @@ def describe(header: Header) -> str:
     return f"{header.source}: {numbers}"
 
 
+def voxel_of(one: Header, other: Header, at: ArrayLike) -> NDArray[np.float64]:
+    """The place (3,) in voxels of one scan of a voxel ``at`` (3,) of another."""
+    return np.asarray(one.grid.to_index(other.grid.to_mm(np.asarray(at, float))))
+
+
 def require_same_geometry(reference: Header, other: Header, name: str = "") -> None:
     """Refuse a scan whose corners lie more than SAME_VOXELS from the reference's. name : of it, for the message."""
-    found, shift = "the shapes differ", float("inf")
     if reference.shape == other.shape:
         apart = np.linalg.norm(corners_mm(reference.grid) - corners_mm(other.grid), axis=1)
         shift = float(apart.max() / reference.spacing_mm.min())
-        found = f"their corners lie {shift:.2f} voxels apart"
-    if shift > SAME_VOXELS:
-        raise LoadError(
-            f"geometry differs between scans of one case: {found}, allowed {SAME_VOXELS} voxel.\n"
-            f"  {describe(reference)}\n  {name + ' of ' if name else ''}{describe(other)}\n"
-            "  Resample the scans onto one grid, or split them into two cases."
-        )
+        found = f"their corners lie {shift:.2f} voxels apart, allowed {SAME_VOXELS}"
+        if shift <= SAME_VOXELS:
+            return
+    else:
+        shapes = f"{list(reference.shape)} and {list(other.shape)} voxels"
+        found = f"the shapes differ, {shapes}, {_otherwise(reference, other)}"
+    raise LoadError(
+        f"geometry differs between scans of one case: {found}.\n"
+        f"  {describe(reference)}\n  {name + ' of ' if name else ''}{describe(other)}\n"
+        "  Bring them onto one grid: sitk.Resample(scan, other) of SimpleITK, or Resample Image (BRAINS) of 3D Slicer, "
+        "brings a scan onto the grid of another one."
+    )
+
+
+def _otherwise(one: Header, other: Header) -> str:
+    """In what two scans of different shapes differ besides, in words."""
+    if not np.allclose(one.spacing_mm, other.spacing_mm, rtol=1e-3):
+        return f"and so do the spacings, {one.spacing_mm.round(4).tolist()} and {other.spacing_mm.round(4).tolist()} mm"
+    turn_deg = float(np.degrees(np.arccos(np.clip(0.5 * (np.trace(one.direction.T @ other.direction) - 1.0), -1, 1))))
+    if turn_deg > LEAST_TURN_DEG:
+        return f"and the axes are turned by {turn_deg:.2g} degrees or mirrored"
+    at = voxel_of(one, other, np.zeros(3)).round(2).tolist()
+    return f"the second begins at voxel {at} of the first; crops are read where that is whole and they share most"

@@ -24,7 +24,13 @@ _MOVE = "move entry_mm (or lumen_seed_mm, where the case gives it) well into the
 """entry_mm first: it is the seed of every case that gives no other."""
 
 
-INVERTED = "; or the scan is inverted (the vessel dark, or grey that rises the other way): turn its grey round"
+INVERTED = (
+    "; or the vessel is not filled (air, water: darker than what is around it, with a bright wire): give its lumen as "
+    "a file (manifest key lumen) and leave the scans as they are; or the scan is inverted, and the wire is dark, too: "
+    "turn its grey round"
+)
+"""An unfilled phantom whose grey is turned round has a dark wire, and no frame of it is traced; with a lumen that was
+given, its own scans were traced to 0.02 mm, with a reference and without."""
 
 
 def _at(grid: Grid, seeds: Index) -> str:

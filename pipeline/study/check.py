@@ -86,7 +86,7 @@ def _look_at_scans(case: Case, config: Config, absent: Container[Path], whole: b
         found.tried(require_whole, header, config.load)
     if empty is not None:
         found.tried(require_one, empty)
-    scans = Scans(empty, tuple(volume for header in frames if header for volume in each_volume(header)))
+    scans = Scans(empty, tuple(volume for header in frames if header for volume in each_volume(header))).cut
     found += apart(scans.all)
     found += entry_problems(case, scans)
     return None if None in frames else len(scans.frames) or case.frame_count

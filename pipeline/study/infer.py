@@ -9,6 +9,7 @@ import numpy as np
 from scipy import ndimage
 
 from pipeline.load import SUFFIXES, load, read_header
+from pipeline.load.common import on_common_box
 from pipeline.load.config import LoadConfig
 from pipeline.load.dicom import series_in
 from pipeline.load.geometry import LoadError, unusable
@@ -205,7 +206,7 @@ def _stated_or_seen(
         return entry, direction, ""
 
     looked_at = [reference, frames[0], frames[-1]] if reference else frames[:1]
-    headers = {path: read_header(path, config) for path in looked_at}
+    headers = dict(zip(looked_at, on_common_box([read_header(path, config) for path in looked_at]), strict=True))
     if problems := apart([*headers.values()]):
         raise LoadError(problems[0])
 

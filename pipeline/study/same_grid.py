@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 from pipeline.load import Header, LoadError, require_same_geometry
+from pipeline.load.common import is_crop
 
 
 def apart(headers: Sequence[Header]) -> list[str]:
@@ -15,7 +16,8 @@ def apart(headers: Sequence[Header]) -> list[str]:
     wrong = [(header, text) for header in others if (text := _against(first, header))]
     if not wrong:
         return []
-    text = wrong[0][1]
+    # a crop would be read but for the others: one that is none is what is wrong
+    text = next((text for header, text in wrong if not is_crop(first, header)), wrong[0][1])
     if len(wrong) == 1:
         return [text]
     if len(wrong) == len(others) and not any(_against(others[0], header) for header in others[1:]):

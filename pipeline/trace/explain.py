@@ -29,7 +29,7 @@ from pipeline.trace.doubts import doubted, no_wire, not_washed_out
 from pipeline.trace.noise import inflation
 from pipeline.trace.subtraction import Subtraction, levelled
 from pipeline.trace.tube import DIM_END, Tube, point_sigmas
-from pipeline.trace.verdict import SURE_CNR, Verdict, judge, note_of
+from pipeline.trace.verdict import SURE_CNR, Verdict, judge, note_of, shares_of
 
 SAMPLE_VOXELS = 1.0
 """Spacing of the curve's points."""
@@ -219,9 +219,11 @@ def _curve(image: Subtraction, best: Candidate) -> Curve:
         "residual_rms": tube.residual_rms, "blur_mm": tube.sigma, "knot_mm": tube.knot_mm, "cnr": attempt.cnr(image),
         "inflation": float(np.median(across)), "inflation_tip": float(along[-1]),
     }  # fmt: skip
+    inside, outside = image.wall_greys
     return Curve(
         image.world(best.points), sigma, tip_sigma, verdict.flagged, verdict.status,
         verdict.note, counters, levels=levels, elsewhere_mm=image.world(attempt.elsewhere),
+        brightness=tube.brightness(shares_of(tube, best.points)), contrast=inside - outside,
     )  # fmt: skip
 
 

@@ -64,6 +64,14 @@ class Tube:
         u = np.linspace(0.0, 1.0, 20 * len(self.tint))
         return float(np.median(np.interp(u, np.linspace(0, 1, len(self.tint)), self.tint) * self.steps.at(u)))
 
+    def brightness(self, share: Array) -> Array:
+        """Grey above the background summed across the wire, grey mm2 (n,), at shares (n,) of the length.
+
+        A blur leaves it as it is: a Gaussian of that peak has 2 pi sigma^2 times as much.
+        """
+        tint = np.interp(share, np.linspace(0.0, 1.0, len(self.tint)), self.tint)
+        return np.asarray(2.0 * np.pi * self.sigma**2 * tint * self.steps.at(share))
+
     @property
     def intervals(self) -> int:
         """Number of spline pieces."""

@@ -95,7 +95,7 @@ def _averaged(values: Array, width: int) -> Array:
     return np.asarray(np.convolve(values, kernel, "same") / np.convolve(np.ones(len(values)), kernel, "same"))
 
 
-def _shares(tube: Tube, points: Array) -> Array:
+def shares_of(tube: Tube, points: Array) -> Array:
     """Shares (n,) of the tube's length at which points (n, 3) lie, the last at its end."""
     arc = arc_length(points)
     return np.asarray(1.0 - (arc[-1] - arc) / max(tube.length_mm, arc[-1]))
@@ -108,7 +108,7 @@ def _crest_share(image: Subtraction, attempt: Attempt, points: Array, step_mm: f
     the mean the rest.
     """
     grey, steps = image.along(points), attempt.tube.steps
-    height = steps.at(_shares(attempt.tube, points)) if steps.stated else np.ones(len(points))
+    height = steps.at(shares_of(attempt.tube, points)) if steps.stated else np.ones(len(points))
     usual = float(np.median(grey / height)) if steps.stated else _usual(grey, steps)
     share = _averaged(grey / height, max(1, round(MEAN_OVER_MM / step_mm))) / max(usual, 1e-9)
     count = max(1.0, MEAN_OVER_MM / max(step_mm, 1.5 * image.voxel))
@@ -164,7 +164,7 @@ def judge(image: Subtraction, attempt: Attempt, points: Array, bridged: NDArray[
     step = length_mm / max(1, len(points) - 1)
     share, noise = _crest_share(image, attempt, points, step)
     ends = np.minimum(np.arange(len(points)), np.arange(len(points))[::-1]) * step
-    known = seen_steps(attempt.tube.steps, _shares(attempt.tube, points))
+    known = seen_steps(attempt.tube.steps, shares_of(attempt.tube, points))
     faint = (share < FAINT + noise) & (ends > MEAN_OVER_MM) & ~known
     places = places_around(points, attempt.tube.sigma)
     read = read_around(image, places)
@@ -232,7 +232,7 @@ def _of_the_line(
          f"{least_cnr:.1f} where it is so long, or the curve of the frame before, confirmed by this one",
          "check that the frame shows a wire; scan with more dose or list a frame of a smaller depth before it"),
         (outside.mean() > MOST_OUTSIDE, FrameStatus.TRACE_LEFT_LUMEN,
-         f"{100 * outside.mean():.0f} % of the curve over 2 voxels outside the lumen",
+         f"{100 * outside.mean():.3g} % of the curve over 2 voxels outside the lumen",
          f"{100 * MOST_OUTSIDE:.0f} % at most", "check the lumen, and whether the phantom moved between the scans"),
         (left_mm > most_mm, FrameStatus.TRACE_AMBIGUOUS,
          f"{left_mm:.1f} mm of bright line off the curve", f"{most_mm:.1f} mm at most",

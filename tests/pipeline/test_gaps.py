@@ -118,6 +118,19 @@ def test_a_gap_that_nothing_explains_is_a_warning_and_a_stated_depth_ends_all_do
     assert own_gaps(stated, 0.3) == (stated, [])
 
 
+def test_frames_that_end_at_one_point_while_their_gaps_grow_are_counted():
+    """A fragment that stayed at 22 to 26 mm while the rest was pulled back: four frames were ok, each gap named."""
+    seen = [replace(f) for f in frames([12.0, 26.1, 26.0, 26.2, 26.1], [NAN] * 5)]
+    for n, gap_mm in ((2, 1.5), (3, 3.4), (4, 5.3)):
+        curve = seen[n].curve
+        assert curve is not None
+        seen[n] = replace(seen[n], curve=replace(curve, levels={BEYOND_GAP: 4.0, GAP: gap_mm}))
+    _, (said,) = own_gaps(seen, 0.35)
+    assert "4 frames (1, 2, 3, 4) end at the same point, though the gap in them is 1.5 mm long in one and 5.3" in said
+    other = gapped([40.0, 44.0, 48.0], [10.0, 16.0, 3.0], doubted=False)
+    assert "end at the same point" not in own_gaps(other, 0.35)[1][0]
+
+
 def marked(lengths: list[float], expected: float = NAN) -> list[Frame]:
     """Frames in which a marker stands 36 mm deep, seen where the wire ends well before it."""
     at = np.array([[0.0, 0.3, 36.0]])

@@ -266,7 +266,7 @@ def test_the_wire_begins_where_it_stays_in_place() -> None:
         assert infer_entry(first, None, Path("f.mha"), told)[2] == AT_EDGE
 
 
-@pytest.mark.parametrize(("size", "origin_mm", "said"), [(12, 0.0, "the shapes differ"), (16, 1.0, "voxels apart")])
+@pytest.mark.parametrize(("size", "origin_mm", "said"), [(12, 0.3, "the shapes differ"), (16, 1.0, "voxels apart")])
 def test_a_reference_on_another_grid_is_told_before_it_is_subtracted(
     tmp_path: Path, size: int, origin_mm: float, said: str
 ) -> None:

@@ -11,10 +11,11 @@ import pytest
 from scipy.ndimage import gaussian_filter
 from scipy.spatial import cKDTree
 
-from pipeline.model import Volume
+from pipeline.model import Lumen, Volume
 from pipeline.segment import segment
 from pipeline.segment.levels import seed_voxels
 from pipeline.status import FrameStatus, StageError
+from pipeline.trace import trace
 from solver import Grid
 from tests.later import later
 from tests.pipeline import phantoms
@@ -148,10 +149,35 @@ def test_seeds_outside_the_scan_are_told_where_it_lies() -> None:
     np.testing.assert_array_equal(seed_voxels(grid, [[90.0, 0.0, 0.0], [1.6, 2.0, 5.4]]), [[1, 0, 5]])
 
 
-def test_a_dark_vessel_is_told_as_an_inverted_scan():
-    """The advice was to move the entry."""
+def test_a_dark_vessel_is_told_as_one_that_is_not_filled_or_as_an_inverted_scan():
+    """The advice was to move the entry; then to turn the grey round: a bright wire is dark then, and not traced."""
     curve, origin, clean = tube(1.5)
     rng = np.random.default_rng(0)
     dark = Volume(np.float32(2000.0 - clean + rng.normal(0.0, 20.0, clean.shape)), [VOXEL] * 3, origin)
-    with pytest.raises(StageError, match="or the scan is inverted"):
+    with pytest.raises(StageError, match="or the scan is inverted, and the wire is dark, too") as error:
         segment(dark, curve[len(curve) // 2][None])
+    assert "the vessel is not filled" in str(error.value)
+    assert "manifest key lumen) and leave the scans as they are" in str(error.value)
+
+
+@pytest.mark.parametrize("with_reference", [True, False])
+def test_a_wire_in_air_is_traced_where_the_lumen_was_given(with_reference: bool) -> None:
+    """What the refusal of an unfilled phantom advises."""
+    curve, origin, clean = tube(1.5)
+    shape, rng = clean.shape, np.random.default_rng(1)
+    air = phantoms.BACKGROUND - 1.2 * (clean - phantoms.BACKGROUND)
+    wire = curve[: round(18.0 / 0.05)]
+    held = phantoms.add_wire(air.copy(), wire, 0.2, 3000.0, VOXEL, origin)
+    still, frame = (
+        Volume(np.float32(gaussian_filter(grey, 0.8) + rng.normal(0.0, 30.0, shape)), [VOXEL] * 3, origin)
+        for grey in (air, held)
+    )
+    depth = np.float32(np.minimum(phantoms.distance_to(curve, shape, VOXEL, origin, 4.5), 4.5) - 1.5)
+    start = 60  # 3 mm of wire before the entry
+    found = trace(
+        frame, Lumen(Grid(depth, [VOXEL] * 3, origin)), curve[start], curve[start + 1] - curve[start],
+        reference=still if with_reference else None,
+    )  # fmt: skip
+    assert found.status is FrameStatus.OK, found.note
+    assert np.max(cKDTree(wire).query(found.points_mm)[0]) < VOXEL
+    assert np.linalg.norm(found.points_mm[-1] - wire[-1]) < VOXEL

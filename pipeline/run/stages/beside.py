@@ -40,17 +40,8 @@ def beside_what_is_seen(
 
     seen : of each frame the wire that its scan shows; None where the curve of the frame is that very one.
     """
-    both = [
-        _off(frame, frame.curve, wire)
-        for frame, wire in zip(frames, seen, strict=True)
-        if wire is not None and wire.status is FrameStatus.OK and frame.curve is not None and frame.traced
-    ]
-    said = {}
-    for one in both:
-        if one.away > max(OFF_VOXELS * voxel_mm, OFF_SIGMAS * one.sigma):
-            said[one.frame] = f"{one.away:.2f} mm off"
-        elif abs(one.longer) > config.length_tolerance_mm:
-            said[one.frame] = f"{abs(one.longer):.1f} mm {'longer' if one.longer > 0 else 'shorter'}"
+    both = _both(frames, seen)
+    said = _apart(both, config, voxel_mm)
     each = listed([f"frame {index}: {what}" for index, what in said.items()], MOST_NAMED)
     found = [each] * bool(said) + (_together(both, voxel_mm) if 2 * len(said) < len(both) else [])
     return [
@@ -58,6 +49,36 @@ def beside_what_is_seen(
         "which frame, its units and LPS; without the key traces the scans are traced"
         for what in found
     ]
+
+
+def elsewhere(
+    frames: Sequence[Frame], seen: Sequence[Curve | None], config: TraceConfig, voxel_mm: float
+) -> frozenset[int]:
+    """Numbers of the frames whose own curves lie off the wires that are seen: no lumen is opened for what they say.
+
+    seen : as in ``beside_what_is_seen``.
+    """
+    return frozenset(_apart(_both(frames, seen), config, voxel_mm))
+
+
+def _both(frames: Sequence[Frame], seen: Sequence[Curve | None]) -> list[_Off]:
+    """Of each frame with a curve of its own in whose scan a wire is surely seen, how far the two are apart."""
+    return [
+        _off(frame, frame.curve, wire)
+        for frame, wire in zip(frames, seen, strict=True)
+        if wire is not None and wire.status is FrameStatus.OK and frame.curve is not None and frame.traced
+    ]
+
+
+def _apart(both: Sequence[_Off], config: TraceConfig, voxel_mm: float) -> dict[int, str]:
+    """By frame, in words, what its curve is off by; frames whose curves are where the wire is seen are left out."""
+    said = {}
+    for one in both:
+        if one.away > max(OFF_VOXELS * voxel_mm, OFF_SIGMAS * one.sigma):
+            said[one.frame] = f"{one.away:.2f} mm off"
+        elif abs(one.longer) > config.length_tolerance_mm:
+            said[one.frame] = f"{abs(one.longer):.1f} mm {'longer' if one.longer > 0 else 'shorter'}"
+    return said
 
 
 def _off(frame: Frame, own: Curve, wire: Curve) -> _Off:

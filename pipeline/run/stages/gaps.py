@@ -10,9 +10,10 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from pipeline.model import Curve, arc_length
-from pipeline.run.stages.known import Frame
+from pipeline.run.stages.known import Frame, trusted
 from pipeline.status import FrameStatus
 from pipeline.trace import BEYOND_GAP, GAP, cleared
+from reports.case_files import listed
 
 FEWEST = 3
 """Frames that must agree on a gap."""
@@ -53,8 +54,27 @@ def own_gaps(frames: Sequence[Frame], voxel_mm: float) -> tuple[list[Frame], lis
         return out, []
     return out, [
         f"frames {', '.join(odd)}: so much of the traced wire lies beyond a gap in it, and a second device that faces "
-        "the wire's tip would look the same: look at the picture, or state insertion_mm"
+        f"the wire's tip would look the same: look at the picture, or state insertion_mm{_at_one_place(out, voxel_mm)}"
     ]
+
+
+def _at_one_place(frames: Sequence[Frame], voxel_mm: float) -> str:
+    """In words, that frames end at one place while their gaps grow; empty where none do.
+
+    A wire that is pushed or drawn takes its end along; what stays while the rest is drawn back has broken off.
+    """
+    unstated = {n: c for n, c in trusted(frames).items() if np.isnan(frames[n].expected_mm)}
+    for curve in unstated.values():
+        end = curve.points_mm[-1]
+        there = [n for n, c in unstated.items() if np.linalg.norm(c.points_mm[-1] - end) < STAYED_VOXELS * voxel_mm]
+        gaps = [unstated[n].levels[GAP] for n in there if GAP in unstated[n].levels]
+        if len(there) >= FEWEST and len(gaps) > 1 and np.ptp(gaps) > AGREE_VOXELS * voxel_mm:
+            return (
+                f"; {len(there)} frames ({listed([*map(str, there)])}) end at the same point, though the gap in them "
+                f"is {min(gaps):.1f} mm long in one and {max(gaps):.1f} mm in another: what lies there did not move "
+                "with the wire, as an end of it that has broken off, or another device"
+            )
+    return ""
 
 
 def _faced(frames: list[Frame], voxel_mm: float) -> list[Frame]:

@@ -76,7 +76,7 @@ def _smooth(curve: Curve) -> Curve:
     if curve.status is not FrameStatus.OK or share <= LONGER:
         return curve
     note = (
-        f"{curve.note}: {curve.length_mm:.2f} mm long, {100 * share:.0f} % more than arcs through its points "
+        f"{curve.note}: {curve.length_mm:.2f} mm long, {100 * share:.3g} % more than arcs through its points "
         f"{CHORD_MM:g} mm apart, allowed {100 * LONGER:g} %: it zigzags, as from voxel to voxel, or its "
         "points scatter; its length is taken for the wire's: smooth it"
     )
@@ -91,7 +91,7 @@ def _in_lumen(curve: Curve, distance: Grid, stiffness_N_mm2: float) -> Curve:
     if curve.status is not FrameStatus.OK or share <= MOST_OUTSIDE:
         return curve
     note = (
-        f"{curve.note}: {100 * share:.0f} % of the curve lie over {allowed / voxel:.2g} voxels outside the lumen, "
+        f"{curve.note}: {100 * share:.3g} % of the curve lie over {allowed / voxel:.2g} voxels outside the lumen, "
         f"allowed {100 * MOST_OUTSIDE:.0f} %; are lumen and curve in the same coordinates (LPS mm), and of the same "
         "phantom?"
     )

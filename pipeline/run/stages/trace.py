@@ -1,5 +1,6 @@
 """trace: the real wire of every frame, one crop held at a time."""
 
+from collections.abc import Collection
 from dataclasses import replace
 from functools import cached_property
 from typing import NamedTuple
@@ -10,13 +11,15 @@ from pipeline.arrays.fingerprint import known_by
 from pipeline.arrays.grids import corners_mm
 from pipeline.load import Crop, Header
 from pipeline.model import Curve, Lumen, Volume
-from pipeline.register import Motion
+from pipeline.register import Anchor, Motion, anchor
+from pipeline.register.drift import of_drift, with_drift
 from pipeline.register.frames import Alignment, alignment_of, counters_of, put_in_place, sentences_of, widened
 from pipeline.run.helpers import Earlier
 from pipeline.run.log import Log
 from pipeline.run.projections import grey_window, projections
 from pipeline.run.stages.before import NOTHING, Before
-from pipeline.run.stages.beside import beside_what_is_seen
+from pipeline.run.stages.beside import beside_what_is_seen, elsewhere
+from pipeline.run.stages.brightness import of_another_brightness
 from pipeline.run.stages.depths import (
     in_another_order,
     in_step,
@@ -69,16 +72,18 @@ def trace_frames(run: Context, known: Known) -> Known:
     frames = _in_step(run, turned_round(frames), voxel_mm)
     run.log.warnings += [*faint_ends(frames), *alike(frames), *rescanned(frames, run.case.calibrated_traces)]
     run.log.warnings += barely_seen(frames) if run.case.wire.opacity is None else []
-    run.log.warnings += too_thin(frames, known.vessel, run.case.wire.radius_mm)
+    radius_mm = run.case.wire.radius_mm
+    run.log.warnings += [*too_thin(frames, known.vessel, radius_mm), *of_another_brightness(frames, radius_mm)]
     if not given:
         run.log.warnings += cut_off(trusted(frames))
-    run.log.warnings += beside_what_is_seen(frames, [part.seen for part in parts], run.config.trace, voxel_mm)
+    seen = [part.seen for part in parts]
+    run.log.warnings += beside_what_is_seen(frames, seen, run.config.trace, voxel_mm)
     run.log.warnings += work.wire_in_reference
     run.log.warnings += _in_plane(frames, run.config.trace)
     assumed, doubtful = sentences_of(work.alignment, {frame.index: frame.registration for frame in frames})
     run.log.assumptions += assumed
-    run.log.warnings += doubtful
-    return _with_room(run, known, frames)
+    run.log.warnings += doubtful + of_drift({f.index: f.curve for f in frames if f.curve is not None})
+    return _with_room(run, known, frames, elsewhere(frames, seen, run.config.trace, voxel_mm))
 
 
 def _in_step(run: Context, frames: list[Frame], voxel_mm: float) -> list[Frame]:
@@ -98,10 +103,10 @@ def _in_step(run: Context, frames: list[Frame], voxel_mm: float) -> list[Frame]:
     return frames
 
 
-def _with_room(run: Context, known: Known, frames: list[Frame]) -> Known:
-    """The case with its frames, and a lumen that has room for their traces."""
-    wire, wall = run.case.wire, run.case.wall
-    curves, given = [*trusted(frames).values()], run.case.lumen is not None
+def _with_room(run: Context, known: Known, frames: list[Frame], doubted: Collection[int] = ()) -> Known:
+    """The case with its frames, and a lumen that has room for their traces, but for those of doubted numbers."""
+    wire, wall, given = run.case.wire, run.case.wall, run.case.lumen is not None
+    curves = [curve for number, curve in trusted(frames).items() if number not in doubted]
     lumen = opened(known.vessel, curves, wire.radius_mm, wall.stiffness_N_mm2, given=given)
     run.log.warnings += lumen.warnings[len(known.vessel.warnings) :]
     run.lumen_known(lumen)
@@ -146,6 +151,19 @@ class _Tracing:
         """A warning where the reference shows a wire, too."""
         return wire_in_reference(self.run, self.reference, self.lumen)
 
+    @cached_property
+    def first(self) -> Anchor | None:
+        """What tells whether the phantom moved since the first frame; None where frames are registered or need not be.
+
+        No file is counted as read once more for it.
+        """
+        if self.reference is not None or self.given or self.run.config.trace.register != "auto":
+            return None
+        try:
+            return anchor(Crop(self.headers[0], self.box, self.load).load(), self.lumen)
+        except StageError:  # said where it is read to be traced
+            return None
+
     def meanwhile(self) -> None:
         """Make what is needed soon, while helpers trace; the wall takes a second and more with 256^3 voxels."""
         if self.run.goes_to("simulate"):
@@ -183,6 +201,9 @@ class _Tracing:
         log.count("trace", counters_of(registration))
         frame = replace(frame, registration=registration, voxels=known_by(volume))
         seen = widened(self.follow(run, frame, here, earlier), registration)
+        if frame.index:
+            with log.timed("trace", frame.index):
+                seen = with_drift(seen, volume, self.first)
         done = _of_scan(run, frame, seen, self.lumen)
         if self.given:
             done = as_given(run, frame, self.given[frame.index], self.lumen.distance)
