@@ -22,11 +22,15 @@ _MAX_NAMES = 90  # more labels than that overlap at the largest height
 
 @dataclass(frozen=True, eq=False)
 class RunFiles:
-    """Tables of a run. errors maps a case to its errors.csv; summary has one row per case; sweep may be empty."""
+    """Tables of a run. errors maps a case to its errors.csv; summary has one row per case; sweep may be empty.
+
+    planned : frames over all validation cases, those without a result among them, as far as that is known.
+    """
 
     errors: dict[str, pd.DataFrame]
     summary: pd.DataFrame
     sweep: pd.DataFrame
+    planned: int = 0
 
 
 def case_frame_map(run: RunFiles) -> Drawing | None:
