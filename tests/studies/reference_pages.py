@@ -313,6 +313,7 @@ def frames() -> str:
     parts = [
         *("# frames.h5\n", NOTE, f"```text\n{text}\n```\n"),
         f"Datasets of a frame, as far as it has them:\n\n```text\n{of_a_frame}\n```\n",
+        "The lines in `view/` have other numbers of points, and [arrays of their own](columns.md).\n",
         *("Attributes of the file:\n", table(("name", "value"), rows)),
     ]
     return "\n".join(parts)
