@@ -133,6 +133,11 @@ def not_run(out_dir: Path) -> list[str]:
     return [name for name, asked in _without_result(out_dir).items() if asked]
 
 
+def planned_frames(out_dir: Path) -> dict[str, int]:
+    """Frames that the manifests of a folder plan, by case that is to be scored; less than all of an older version."""
+    return {str(name): int(count) for run in runs_in(out_dir) for name, count in (run.get("to_score") or {}).items()}
+
+
 def amiss(folder: Path) -> str:
     """Which file of a finished case is missing, or has another size than its ledger.json says; empty if none.
 

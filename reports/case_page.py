@@ -101,14 +101,14 @@ def _case_verdict(case: CaseFiles, copied: str) -> str:
     """
     nothing = "the case has no result.json: it did not finish; see log.txt"
     said = str(case.result.get("sentence", nothing)).strip().rstrip(".")
+    scored = _scored(case)
+    how = verdict(scored, case.simulator, Doubt(copied)) if scored or not case.statistics else OF_CALIBRATION
     good, planned = case.statistics.get("frames_ok"), case.statistics.get("frames")
     became = said[:1].upper() + said[1:] + "."
     if fitted := case.statistics.get("frames_fitted"):
         became = scans(good or 0, planned or 0, fitted, scored_or_ok([case])) + "."
     elif planned and good != planned:
-        became = f"{good} of {counted(planned, 'frame')} have a result."
-    scored = _scored(case)
-    how = verdict(scored, case.simulator, Doubt(copied)) if scored or not case.statistics else OF_CALIBRATION
+        became = "" if how.startswith("On ") else f"{good} of {counted(planned, 'frame')} have a result."
     judged = bool(how) and not copied and _content.number(scored.get("skill_strongest")) != _content.NOTHING
     ids = {name for run in runs_in(case.folder.parents[1]) for name in run.get("planned") or ()}
     alone = "The predictor 'another insertion' may be stronger; it is judged over the run, on its first page."

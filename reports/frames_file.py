@@ -9,8 +9,8 @@
     /frames/NNN/straightened    optional uint8, the scan along the traced wire: planes across it, ``along_mm`` apart,
                          of samples ``across_mm`` apart, the wire in their middle; ``normal``: their first axis
 
-The file has the attributes of ``ATTRIBUTES``, each dataset of a frame the attribute ``unit``. Curves are LPS mm,
-arrays indexed x, y, z; NNN is the zero-based frame index, zero-padded.
+The file has the attributes of ``ATTRIBUTES``, each dataset the attribute ``unit``: ``mm``, ``mm^2``, ``N``, or ``1``
+for flags and grey values. Curves are LPS mm, arrays indexed x, y, z; NNN is the zero-based frame index, zero-padded.
 """
 
 import io
@@ -126,7 +126,7 @@ def write_frames(path: Path, scan: ScanCrop | None, frames: Iterable[FrameArrays
             for name in _ARRAYS:
                 if getattr(frame, name) is not None:
                     values = group.create_dataset(name, data=np.asarray(getattr(frame, name), dtype=np.float64))
-                    values.attrs["unit"] = name.rpartition("_")[2] if name.endswith(("_mm", "_N")) else "1"
+                    values.attrs["unit"] = _unit_of(name)
             _write_pictures(group, "mip", frame.mips)
             if frame.straightened is not None:
                 planes = _packed(group, "straightened", frame.straightened.values)
@@ -170,6 +170,11 @@ def read_arrays(path: Path, *names: str) -> dict[int, dict[str, Array]]:
         }
 
 
+def _unit_of(name: str) -> str:
+    """The unit of a dataset, which its name ends in; grey values and flags have none."""
+    return {"mm": "mm", "mm2": "mm^2", "N": "N"}.get(name.rpartition("_")[2], "1")
+
+
 def _read_straightened(group: Any) -> Straightened | None:
     if "straightened" not in group:
         return None
@@ -186,6 +191,7 @@ def _write_pictures(group: Any, prefix: str, pictures: Pictures) -> None:
 def _packed(group: h5py.Group, name: str, values: NDArray[np.uint8]) -> h5py.Dataset:
     """A packed dataset in the file. Left to HDF5, its bytes go there whenever the garbage collector comes by."""
     dataset = group.create_dataset(name, data=values, **_PACKED)
+    dataset.attrs["unit"] = _unit_of(name)
     dataset.flush()
     return dataset
 

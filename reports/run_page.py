@@ -87,7 +87,9 @@ def run_files(out_dir: Path, cases: Sequence[CaseFiles]) -> RunFiles:
     summary, sweep = (read_if_there(out_dir / table.file, table) for table in (SUMMARY, SWEEP))
     summary, found = _content.worst_first(summary), {case.name: case.errors for case in cases}
     names = dict.fromkeys([*summary["case"], *found])
-    return RunFiles({name: found[name] for name in names if name in found}, summary, sweep)
+    planned = first_row(read_if_there(out_dir / OVERALL_FILE, SUMMARY)).get("frames", 0)
+    known = int(planned) if pd.notna(planned) else 0
+    return RunFiles({name: found[name] for name in names if name in found}, summary, sweep, known)
 
 
 def _is_tall(section: Mapping[str, Any]) -> bool:
@@ -99,8 +101,8 @@ def _run_failures(out_dir: Path, cases: list[CaseFiles], links: dict[str, str]) 
     whose pages lie beside their logs."""
     rows = in_texts(read_if_there(out_dir / FAILURES.file, FAILURES))
     beside = [row for row in rows if _of_another(row)]
-    # the page finds out itself what it cannot read
-    own = [row for row in rows if row not in beside and row["status"] != "damaged"]
+    # the page finds out itself what it cannot read, and which cases have no result
+    own = [row for row in rows if row not in beside and row["status"] not in ("damaged", "not_run")]
     known = {row["case"] for row in own}
     for case in cases:
         if case.name not in known and case.result.get("status") not in GOOD:
@@ -143,8 +145,16 @@ def _worse_cases(summary: pd.DataFrame, links: Mapping[str, str]) -> dict[str, A
 def _not_counted(out_dir: Path) -> dict[str, str]:
     """Cases that no number of the page is over, and results that its sweep lacks."""
     said = {"left_over": left_over_sentence, "not_run": not_run_sentence, "left_out": left_out_sentence}
-    said["not_swept"] = not_swept_sentence
+    said |= {"not_swept": not_swept_sentence, "not_run_counted": _frames_not_run}
     return {name: sentence(out_dir) for name, sentence in said.items()}
+
+
+def _frames_not_run(out_dir: Path) -> str:
+    """What becomes of the frames of cases without a result in the numbers of the page."""
+    table = read_if_there(out_dir / FAILURES.file, FAILURES)
+    if not (table["status"] == "not_run").any():
+        return "Every number below is over the other cases alone, shares of planned frames, too."
+    return "Errors below are over the other cases alone; shares are of all planned frames, theirs among them."
 
 
 def _simulator(cases: Sequence[CaseFiles]) -> str:

@@ -144,6 +144,7 @@ ALL = "(all)"
 """Stands where the name of a case would, in rows over all of them."""
 ERRORS = Table("errors.csv", pooled_in=SUMMARY)
 POINTS = Table("points.csv.gz")
+WIRE_LINES = Table("view/wire_KIND_NNN.vtp")  # the point arrays of a wire
 FAILURES = Table("failures.csv")
 TIMINGS = Table("timings.csv")  # of a case and its frames; of a run, one row a case
 BUDGET = Table("budget.csv")

@@ -8,18 +8,19 @@ from urllib.parse import quote
 import pandas as pd
 
 from reports import _content
+from reports.alike import alike
 from reports.case_files import counted, listed, not_reached, not_run_sentence
 from reports.doubts import copied_from_traces, doubted, twins, warnings_in
 from reports.figures.simulators import SimulatorFiles, leads
 from reports.gates import gates_in
 from reports.origin import why_not_pooled
 from reports.page import draw_sections, write_page
-from reports.schema import OURS, OVERALL_FILE, SIMULATORS, SUMMARY, WHERE, Column
-from reports.tables import first_row, read_if_there
+from reports.schema import FAILURES, OURS, OVERALL_FILE, SIMULATORS, SUMMARY, WHERE, Column
+from reports.tables import first_row, in_texts, read_if_there
 from reports.verdict import NEVER_NEAREST, Doubt, badge, first_that_holds, tips_off, verdict
 
 PAGE = "simulators.html"
-_MOST_WARNINGS = 5
+_MOST_WARNINGS, _MOST_REASONS = 5, 3
 _MOST_SHARED = 0.75
 """Share of a simulator's frames up to which those that count for all of them are few."""
 
@@ -73,26 +74,43 @@ def _said(alone: Mapping[Any, Any], folder: Path, lines: Sequence[str], copied: 
     frames to be judged beside the others.
     """
     row = first_row(read_if_there(folder / OVERALL_FILE, SUMMARY))
-    row |= {name: value for name, value in alone.items() if "strongest" in name}
+    row |= {name: value for name, value in alone.items() if "strongest" in name or name in ("frames", "frames_ok")}
     if few:  # nor has it a skill against the centreline beside those of the others
         row.pop("skill", None)
     missing, mixed, good = not_run_sentence(folder), why_not_pooled(folder), alone["frames_ok"]
-    failed = f"On {good} of {alone['frames']} frames: " if good < alone["frames"] else ""
+    failed = good < alone["frames"]
     closed = gates_in(folder)["closed"]
     why = {"cases missing": missing, "frames failed": failed, "not pooled": mixed, "gate closed": closed}
     status = first_that_holds(why)
     doubt = Doubt("" if missing or failed or mixed else copied, twins(doubted(folder)))
     said = verdict(row, alone["simulator"], doubt)
     lines = [line for line in lines if line != doubt.copied]
-    said = failed + said if said else mixed or not_reached(folder) or "No frame of it has a result." * (not good)
+    said = said or mixed or not_reached(folder) or "No frame of it has a result." * (not good)
     aside = f" Of the study {missing}." if missing else ""
     more = counted(rest := len(lines) - _MOST_WARNINGS, "more warning")
     return {
         "badge": badge(status, status == "ok", row, doubt),
         "verdict": said + aside,
         "closed": closed,
+        "failures": _failed(folder, alone["simulator"]) if failed else [],
         "warnings": [*lines[:_MOST_WARNINGS], *[f"{more} on the pages of its cases"] * (rest > 0)],
     }
+
+
+def _failed(folder: Path, name: str) -> list[str]:
+    """Which frames of a simulator have no result, and why, a line for those that are alike.
+
+    The first simulator's folder has the failures of all, with their names.
+    """
+    rows = in_texts(read_if_there(folder / FAILURES.file, FAILURES))
+    found = alike(row for row in rows if row["simulator"] in ("", name))
+    lines = [f"{row['case']}, {_which(row)}: {row['status']}: {row['sentence']}" for row in found]
+    rest = len(lines) - _MOST_REASONS
+    return [*lines[:_MOST_REASONS], *[f"and {counted(rest, 'more reason')}"] * (rest > 0)]
+
+
+def _which(row: Mapping[str, Any]) -> str:
+    return f"frame{'s' * (row['count'] > 1)} {row['frames']}" if row["frames"] else "all frames"
 
 
 def _not_ours(warnings: Mapping[str, list[str]], ours: Mapping[str, list[str]]) -> list[str]:

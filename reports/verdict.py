@@ -35,8 +35,9 @@ def verdict(statistics: Mapping[str, Any], simulator: str = "", doubt: Doubt = N
     if rms == NOTHING:
         return ""
     ends = interval(statistics.get("rms_low_mm"), statistics.get("rms_high_mm"))
-    whose = f"The wire of {simulator}" if simulator else "The simulated wire"
-    sentence = f"{whose} lies {rms} mm (rms) from the traced one"
+    whose = f"he wire of {simulator}" if simulator else "he simulated wire"
+    some = _of_frames(statistics)
+    sentence = f"{f'On {some} alone t' if some else 'T'}{whose} lies {rms} mm (rms) from the traced one"
     sentence += f", 95 % interval {ends} mm" if ends else ""
     tail = number(statistics.get("p95_mm"))
     sentence += f"; 95 % of its points lie within {tail} mm." if tail != NOTHING else "."
@@ -217,7 +218,7 @@ def in_short(statistics: Mapping[str, Any]) -> str:
 
 
 def _against(statistics: Mapping[str, Any]) -> str:
-    """Whether the skill, and its interval where there is one, is above zero; of how many of the planned frames."""
+    """Whether the skill, and its interval where there is one, is above zero; what else to know where frames failed."""
     rival, skill, least, _ = _skill(statistics)
     if not rival:
         return ""
@@ -232,7 +233,14 @@ def _against(statistics: Mapping[str, Any]) -> str:
     }
     how = said.get(standing(statistics), f"The wire is better ({value})")
     few = _few_insertions(statistics) if least <= 0.0 < skill else ""
-    return " ".join(filter(None, (f"{how} than {rival}.", few, _of_frames(statistics))))
+    how, weaker = (f"On these frames {how[0].lower()}{how[1:]}", _WEAKER) if _of_frames(statistics) else (how, "")
+    return " ".join(filter(None, (f"{how} than {rival}.", few, weaker)))
+
+
+# a lost half of an insertion took the partner of "another insertion": 0.926 instead of 0.563
+_WEAKER = (
+    "The skill may flatter: predictors that take wires of other frames or insertions are weaker without the others."
+)
 
 
 def _few_insertions(statistics: Mapping[str, Any]) -> str:
@@ -250,13 +258,9 @@ def of_these_alone(statistics: Mapping[str, Any]) -> str:
 
 
 def _of_frames(statistics: Mapping[str, Any]) -> str:
-    """Over how many of the planned frames the verdict speaks, where it is not all of them."""
+    """Over how many of the planned frames a verdict speaks, where it is not all of them; empty where it is."""
     good, planned = (_number(statistics.get(key)) for key in ("frames_ok", "frames"))
-    if not good < planned:
-        return ""
-    # a lost half of an insertion took the partner of "another insertion": 0.926 instead of 0.563
-    weaker = "predictors that take wires of other frames or insertions are weaker without the others"
-    return f"This speaks of {good:.0f} of {planned:.0f} planned frames alone, and {weaker}: it may flatter."
+    return f"{good:.0f} of {planned:.0f} planned frames" if good < planned else ""
 
 
 def _interval_of(least: float) -> str:

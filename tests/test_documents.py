@@ -209,6 +209,12 @@ def test_a_result_fits_its_schema(desk: Path) -> None:
         jsonschema.validate(result | {"schema": 2}, reference_pages.result_schema())
 
 
+def test_what_synth_writes_as_truth_is_in_the_manual(desk: Path) -> None:
+    truth = json.loads((desk / "study" / "truth.json").read_text(encoding="utf-8"))
+    told = {key for keys in reference_pages.TRUTH for key in keys.split(", ")}
+    assert {*truth, *(f"frames[].{key}" for key in truth["frames"][0])} == told - {"frames[].phantom_shift_mm"}
+
+
 def test_the_site_has_every_page() -> None:
     """`make docs` would refuse one that is not in the contents, but it runs by itself."""
     nav = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")

@@ -5,7 +5,7 @@ Also a JUnit summary for CI: one test per frame, so that a build server shows wh
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,10 +17,10 @@ from pipeline.run.exchanged import exchanged
 from pipeline.run.gate import CLOSED, parsed
 from pipeline.run.kin import told_of_kin
 from pipeline.run.overall import Found, found_cases, frames_of, overall, shared_scans, strangers, validation
-from pipeline.run.results import Result, found_results, write_json
+from pipeline.run.results import Result, Row, found_results, lost, write_json
 from pipeline.status import UsageError
 from reports import tables
-from reports.case_files import GOOD, not_reached
+from reports.case_files import GOOD, not_reached, not_run, planned_frames
 from reports.doubts import AMONG, copied_from_traces, doubted, warnings_in
 from reports.gates import GATES, asked_of
 from reports.junit import Outcome, write_junit
@@ -38,6 +38,7 @@ class Totals:
     each of those.
     sweep_lost, sweep_missing : cases that crashed at a point of a sweep, or were not run there; they are not counted in
     ``cases``.
+    missing : cases that the manifest names and that have no result; they are not counted in ``cases`` either.
     frames_fitted : scans that a roll was fitted on; they are not counted in ``frames``.
     """
 
@@ -56,6 +57,7 @@ class Totals:
     sweep_lost: int = 0
     sweep_missing: int = 0
     frames_fitted: int = 0
+    missing: int = 0
 
     @property
     def all_ok(self) -> bool:
@@ -71,23 +73,20 @@ class Totals:
 
 
 def aggregate(out: Path, run_info: dict[str, Any] | None = None, name: str = "run.json") -> Totals:
-    """Write the tables over all cases found, and ``name`` where ``run_info`` is given."""
+    """Write the tables over all cases found, and ``name`` where ``run_info`` is given.
+
+    Without it, when no run is at work, also of cases that the manifest names and that have no result: of a run that is
+    a shard others may still compute them.
+    """
     cases, mixed = found_cases(out), why_not_pooled(out)
     found, among = [case.result for case in cases], [] if mixed else with_another(out, cases)
-    whole = overall(among)
+    missing = _without_result(out) if run_info is None else []
+    whole = overall(among, missing)
     _keep_what_is_seen(out, found, among)
     if whole:
         whole["warnings"] += len(doubted(out)) + len(remarks(whole))
     rows, (times, replayed_s) = [result.summary for result in found], _times(out, found)
-    failures = [row for result in found for row in result.failures]
-    for file, table, given in (
-        (SUMMARY.file, SUMMARY, rows),
-        (OVERALL_FILE, SUMMARY, [whole] * bool(whole)),
-        (FAILURES.file, FAILURES, failures),
-    ):
-        # result files may come from another version, with other columns
-        known = [{name: row[name] for name in row.keys() & table.names} for row in given]
-        tables.write(out / file, table, known)
+    _write_tables(out, rows, whole, [row for result in (*found, *missing) for row in result.failures])
     tables.write(out / TIMINGS.file, TIMINGS, times)
     if run_info is not None:
         write_json(out / name, run_info | {"cases": [result.case for result in found], "overall": whole})
@@ -106,7 +105,34 @@ def aggregate(out: Path, run_info: dict[str, Any] | None = None, name: str = "ru
         bool(mixed),
         *_judged(out, asked_of(out) if run_info is None else run_info.get("fail_if", ()), whole, validation(among)),
         frames_fitted=sum(row.get("frames_fitted") or 0 for row in rows),
+        missing=len(missing),
     )
+
+
+def _write_tables(out: Path, summary: Sequence[Row], whole: Row, failures: Sequence[Row]) -> None:
+    """Write the rows of the cases, of all of them (none where ``whole`` is empty) and of what failed."""
+    for file, table, given in (
+        (SUMMARY.file, SUMMARY, summary),
+        (OVERALL_FILE, SUMMARY, [whole] * bool(whole)),
+        (FAILURES.file, FAILURES, failures),
+    ):
+        # result files may come from another version, with other columns
+        known = [{name: row[name] for name in row.keys() & table.names} for row in given]
+        tables.write(out / file, table, known)
+
+
+def _without_result(out: Path) -> list[Result]:
+    """Stand-ins for the cases that runs into a folder name and that have no result there, as those of a lost shard.
+
+    They have the frames that the manifest plans where they were to be scored, else none; and no log, if none was begun.
+    """
+    planned, found = planned_frames(out), []
+    why = "no run into this folder has finished it; run it, or copy the folder of the shard that did here"
+    for name in not_run(out):
+        one = lost(name, "not_run", why, stage="run", frames=planned.get(name, 0))
+        log = (out / "cases" / name / "log.txt").exists()
+        found.append(one if log else replace(one, failures=[row | {"log": ""} for row in one.failures]))
+    return found
 
 
 def _keep_what_is_seen(out: Path, found: Sequence[Result], among: Sequence[Found]) -> None:

@@ -76,6 +76,8 @@ def last_line(totals: Totals, index: Path) -> str:
         parts.append(f"{counted(totals.frames - totals.frames_ok, 'frame')} not ok (failures.csv)")
     elif totals.cases_ok < totals.cases:  # one that is damaged has no frames to be counted
         parts.append(f"{totals.cases - totals.cases_ok} of the cases not ok (failures.csv)")
+    if totals.missing:
+        parts.append(f"{counted(totals.missing, 'case')} without a result (failures.csv)")
     if totals.sweep_lost:
         parts.append(f"{counted(totals.sweep_lost, 'result')} of the sweep lost")
     if totals.sweep_missing:

@@ -156,6 +156,7 @@ def launch(plan: Plan) -> tuple[Totals, Path]:
     info |= {"sweep": heads, "swept": sorted(plan.ids) if heads else [], "until": plan.template.until}
     info |= {"stated": {case.id: stated(case) for case in plan.manifest.cases}}
     info |= {"planned": [case.id for case in plan.manifest.cases], "doubts": continued(plan.manifest.cases)}
+    info |= {"to_score": {case.id: case.frames_to_score for case in plan.manifest.cases if case.frames_to_score}}
     info |= {"fail_if": [gate.text for gate in plan.gates]}
     name = f"run.{plan.shard.replace('/', '-')}.json" if plan.shard else "run.json"
     info |= {"left_out": _never_asked(out / name, plan.left_out), "config": settings.as_dict()}

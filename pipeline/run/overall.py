@@ -159,15 +159,18 @@ def frames_of(found: Sequence[Found]) -> list[Scored]:
 COUNTED = ("frames", "frames_ok", "frames_failed", "frames_fitted", "warnings")
 
 
-def overall(found: Sequence[Found]) -> dict[str, Any]:
-    """The row of all validation cases, with the columns of summary.csv; empty where no frame counts."""
+def overall(found: Sequence[Found], missing: Sequence[Result] = ()) -> dict[str, Any]:
+    """The row of all validation cases, with the columns of summary.csv; empty where no frame counts.
+
+    missing : cases without a result, whose frames were planned all the same.
+    """
     used = validation(found)
     frames = frames_of(used)
     if not frames:
         return {}
-    rows = [case.result.summary for case in used]
+    rows = [case.result.summary for case in used] + [result.summary for result in missing]
     counts = {name: sum(row.get(name) or 0 for row in rows) for name in COUNTED}
-    good = all(case.result.ok for case in used)
+    good = all(case.result.ok for case in used) and not any(result.frame_count for result in missing)
     head = {"case": ALL, "role": "validation", "status": "ok" if good else "frames_failed", **counts}
     share = within([frame.row for frame in frames], counts["frames"])
     return head | pooled(frames) | {"within_1mm": share, "cases": len(used)}

@@ -39,6 +39,7 @@ LOST = {
     "refused": "the case was left out, as its files cannot be used; mend what the message names, then run it",
     "removed": "the case's result was removed while the run went on; give the same command again",
     "damaged": "a result file cannot be read; run the case again",
+    "not_run": "the manifest names the case, and it has no result here",
 }
 """Statuses of a case that has no result of its own, each with its sentence."""
 

@@ -109,7 +109,8 @@ def _scans_of(known: Known, shown: int) -> tuple[dict[str, Path], str]:
     said = [f"{name} is not opened, since {reason}" for name, reason in why.items() if reason]
     more = len(known.scans.frames) - len(frame)
     said += ["other frames' scans are opened by hand: all lie in the same place (LPS)"] * (more > 0)
-    said += ["scans are found where they lay when the case was run"] * bool(found)
+    moved = "after a move write the new folder into fileName in scene.mrml"
+    said += [f"scans are found where they lay when the case was run: {moved}"] * bool(found)
     return found, "; ".join(said)
 
 
@@ -172,7 +173,7 @@ def _write_wires(folder: Path, frame: Frame) -> None:
         points = frame.curve.points_mm
         arrays = {"arc_mm": arc_length(points)}
         if len(frame.curve.sigma_mm) == len(points):
-            arrays["u_mm"] = frame.curve.sigma_mm
+            arrays["trace_sigma_mm"] = frame.curve.sigma_mm
         _write_wire(folder, "traced", frame, points, arrays)
     if frame.truth_mm is not None and len(frame.truth_mm):
         _write_wire(folder, "true", frame, frame.truth_mm, {"arc_mm": arc_length(frame.truth_mm)})
@@ -188,7 +189,8 @@ def _write_wires(folder: Path, frame: Frame) -> None:
 def _compared(frame: Frame) -> tuple[Array, dict[str, Any]]:
     """Points and arrays of a compared wire: joints in the clamp's reach, then the compared samples with their errors.
 
-    u_mm : standard deviation of the trace at the nearest points.
+    trace_sigma_mm : standard deviation of the trace at the nearest points.     u_val_mm : where there is a budget, the
+    uncertainty of each error in its direction, as in points.csv.gz: an error is held against this one.
     """
     errors, joints = frame.comparison, frame.simulated.joints_mm if frame.simulated is not None else np.zeros((0, 3))
     assert errors is not None
@@ -201,8 +203,10 @@ def _compared(frame: Frame) -> tuple[Array, dict[str, Any]]:
     arrays |= {} if frame.solved is None else {"contact_force_N": contact_at(frame, arc)}
     traced = arc_length(frame.curve.points_mm)
     if len(frame.curve.sigma_mm) == len(traced):
-        u_mm = np.interp(errors.foot_arc_mm, traced, frame.curve.sigma_mm)
-        arrays["u_mm"] = np.concatenate([nothing, u_mm])
+        sigma_mm = np.interp(errors.foot_arc_mm, traced, frame.curve.sigma_mm)
+        arrays["trace_sigma_mm"] = np.concatenate([nothing, sigma_mm])
+    if frame.budget is not None and frame.budget.u_mm is not None:
+        arrays["u_val_mm"] = np.concatenate([nothing, frame.budget.u_mm])
     return np.concatenate([joints[: len(reach)], errors.sample_mm]), arrays
 
 

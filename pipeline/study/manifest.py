@@ -117,6 +117,13 @@ class Case(Strict):
         return bool(self.frames or self.traces or self.projections)
 
     @property
+    def frames_to_score(self) -> int:
+        """Frames that count as planned in numbers over a run, as far as the manifest tells: a file may hold several."""
+        if self.role == "calibration" or not self.compared:
+            return 0
+        return max(len(self.insertion_mm or ()), self.frame_count) - (self.roll_deg == "fit")
+
+    @property
     def unconfirmed(self) -> tuple[str, ...]:
         """What is assumed, less what another key has made void."""
         void = {

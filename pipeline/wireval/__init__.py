@@ -18,6 +18,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
+from . import _own_packages  # noqa: F401 - first: it says what is in the way of the imports below
+
+# isort: split
 from pipeline.cli import BAD_INPUT, carried_out, parsed
 from pipeline.compare import point_to_curve
 from pipeline.run.compared import compared

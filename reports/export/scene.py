@@ -41,7 +41,8 @@ def write_scene(folder: Path, shown: int, scans: Mapping[str, Path] | None = Non
     if not things:
         return None
     root = ET.Element("MRML", version="Slicer5.0.0", userTags="")
-    # by their whole path: the folder of results is copied and moved without the scans
+    # by their whole path: results are merged and moved without the scans (cp -r), to folders from which a relative
+    # path leads elsewhere, and the same run into another folder gives the same bytes
     files = {name: str(path.absolute()) for name, path in (scans or {}).items()}
     volumes = [_Thing("Volume", "VolumeArchetypeStorage", name, file, _GREY) for name, file in files.items()]
     for number, thing in enumerate([*volumes, *things], start=1):

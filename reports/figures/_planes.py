@@ -25,9 +25,11 @@ class Plane(NamedTuple):
 PLANES = (Plane(1, 0, 2), Plane(0, 1, 2), Plane(2, 0, 1))  # from left to right
 WIDTH_INCH = 10.0
 _LPS_NAMES = ("x, towards left", "y, towards back", "z, towards head")
+_WAYS = (("left", "right"), ("back", "front"), ("head", "feet"))  # positive and negative along L, P, S
 _LABELS_INCH = 0.62  # what an axis title and its ticks take beside a panel
 _ROW_INCH = (1.5, 4.6)
 _MARGIN_MM = 5.0
+_EXACT = 0.9995  # cosine of 2 degrees
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,8 +68,13 @@ class View:
         return low[plane.across], high[plane.across], low[plane.up], high[plane.up]
 
     def label(self, axis: int) -> str:
-        """Name of an axis with its unit."""
-        return f"{_LPS_NAMES[axis]}, mm" if self.aligned else f"array axis {axis}, mm from the corner"
+        """Name of an axis with its unit; of an array that is not aligned also the nearest anatomical way."""
+        if self.aligned:
+            return f"{_LPS_NAMES[axis]}, mm"
+        along = self.scan.direction[:, axis]
+        nearest = int(np.abs(along).argmax())
+        exact = abs(along[nearest]) > _EXACT * float(np.linalg.norm(along))
+        return f"axis {axis}, {'towards' if exact else 'about'} {_WAYS[nearest][int(along[nearest] < 0)]}, mm"
 
     def sheet(self, rows: int, square: bool = False) -> tuple[Figure, list[list[Axes]]]:
         """A figure of ``rows`` by three panels at one scale, and a square one at the right if asked."""

@@ -10,6 +10,7 @@ from reports.figures._drawing import Drawing, FrameAxis, error_scale, heat_map, 
 from reports.tables import has
 
 _MOST_OVER_U = 4.0  # twice what counts as beyond
+_NOT_SCORED = "0.88"
 _CLIP_PERCENTILE = 99.5  # of forces, which have no scale of their own: one wild point must not turn the whole map dark
 
 
@@ -54,17 +55,19 @@ def _along_wire(points: pd.DataFrame, column: str, label: str, scale: Normalize)
         return None
     frames = np.arange(int(kept["frame"].min()), int(kept["frame"].max()) + 1)
     step = _step(kept)
-    grid = np.full((len(frames), int(kept["arc_mm"].max() / step) + 2), np.nan)
+    grid, held = np.full((len(frames), int(kept["arc_mm"].max() / step) + 2), np.nan), np.zeros(len(frames))
     for frame, samples in kept.groupby("frame"):
-        # the clamp's reach in front is not scored: it stays blank
         first, last = (round(float(samples["arc_mm"].agg(end)) / step) for end in ("min", "max"))
         at = np.arange(first, last + 1) * step
         nearest = interp1d(samples["arc_mm"], samples[column], kind="nearest", fill_value="extrapolate")
-        grid[int(str(frame)) - frames[0], first : last + 1] = nearest(at)
+        row = int(str(frame)) - frames[0]
+        grid[row, first : last + 1], held[row] = nearest(at), max(first - 0.5, 0.0) * step
     figure = new_figure(float(np.clip(1.4 + 0.12 * len(frames), 2.9, 7.0)))
     axes = figure.subplots()
     edges = (np.arange(grid.shape[1] + 1) - 0.5) * step, np.append(frames, frames[-1] + 1) - 0.5
     heat_map(axes, grid, edges, label, scale, bar={}, rasterized=True)
+    # the clamp's reach in front, which counts in no score: white is beyond the tip
+    axes.barh(frames, held, height=1.0, color=_NOT_SCORED, linewidth=0.0)
     axes.set_xlim(left=0.0)
     axes.set_xlabel("arc length from the entry along the simulated wire, mm")
     axes.set_ylabel("frame")

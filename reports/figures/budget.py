@@ -13,7 +13,8 @@ from reports.schema import BUDGET, ENTRIES
 from reports.tables import has, read_if_there
 
 _ROW_INCH, _REST_INCH = 0.24, 1.1
-MORE_ALONE = "more alone than together"
+_BARS = ["u_mm", "distal_u_mm"]
+MORE_ALONE, NOT_ALONE = "more alone than together", "not computed alone"
 
 
 def budget(case: CaseFiles) -> Drawing | None:
@@ -25,21 +26,23 @@ def budget(case: CaseFiles) -> Drawing | None:
     shown = [table for table in (sources, entries) if len(table)]
     if not shown or case.handed_in:
         return None
-    figure = new_figure(max(_REST_INCH + _ROW_INCH * max(map(len, shown)), 2.6))
+    computed = sources[sources[_BARS].notna().any(axis="columns")]
+    figure = new_figure(max(_REST_INCH + _ROW_INCH * max(len(computed), len(entries)), 2.6))
     panels = iter(figure.subplots(1, len(shown), squeeze=False, width_ratios=[1.5, 1.0][-len(shown) :]).ravel())
     if len(sources):
-        _by_source(next(panels), sources)
+        _by_source(next(panels), computed)
     if len(entries):
         _by_entry(next(panels), entries)
-    note = pd.Series(MORE_ALONE, index=_more_alone(sources), dtype="string")  # the caption says why where there is one
-    return Drawing(figure, pd.concat(shown, ignore_index=True).assign(note=note))
+    # the caption says why where there is one
+    note = pd.Series(MORE_ALONE, index=_more_alone(sources), dtype="string")
+    unknown = pd.Series(NOT_ALONE, index=sources.index.difference(computed.index), dtype="string")
+    return Drawing(figure, pd.concat(shown, ignore_index=True).assign(note=pd.concat([note, unknown])))
 
 
 def _more_alone(sources: pd.DataFrame) -> "pd.Index[int]":
     """Rows of single inputs, which stand above that of all of them, that have a longer bar than these."""
     every = sources["source"].eq("inputs")
-    columns = ["u_mm", "distal_u_mm"]
-    single, most = sources.loc[~every.cummax(), columns], sources.loc[every, columns].max()
+    single, most = sources.loc[~every.cummax(), _BARS], sources.loc[every, _BARS].max()
     return single.index[single.gt(most).any(axis="columns")]
 
 
@@ -51,7 +54,7 @@ def _by_source(axes: Axes, table: pd.DataFrame) -> None:
     axes.barh(places + 0.25, table["distal_u_mm"], 0.2, color=PURPLE, label="last 10 mm")
     names = [name.replace("_", " ") for name in table["source"]]
     axes.set_yticks(places, ["error" if n == "error" else "all: u val" if n == "u val" else n for n in names])
-    axes.invert_yaxis()
+    axes.set_ylim(len(table) - 0.5, -0.5)
     axes.xaxis.set_major_locator(MaxNLocator(5))  # more of 0.025, 0.050, ... run into each other
     axes.set_xlabel("u across the wire, mm")
     plain(axes)

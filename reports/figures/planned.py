@@ -27,7 +27,7 @@ def planned_within(run: RunFiles) -> Drawing | None:
         for case, values in found.items():
             curves[case] = _curve(values, planned[case], everything[-1])
             axes.step(*curves[case], where="post", color=GREY, linewidth=0.8, alpha=pale)
-    across, share = _curve(everything, sum(planned.values()), everything[-1])
+    across, share = _curve(everything, max(run.planned, sum(planned.values())), everything[-1])
     axes.step(across, share, where="post", color=SIMULATED, linewidth=2.0)
     axes.set_ylim(0.0, 1.02)
     axes.set_xlim(left=0.0)

@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from reports.case_files import GOOD
 from reports.colours import BAD, SIMULATED
@@ -16,17 +17,22 @@ from reports.tables import has
 
 _MAX_INCH = 24.0
 _BAR_INCH = 4.0
+_MOST_NUMBERED = 16  # frames up to which a cell is wide enough for its number
 _TOP_TICKS_FROM = 30  # rows from which the lower axis is out of sight
 _MAX_NAMES = 90  # more labels than that overlap at the largest height
 
 
 @dataclass(frozen=True, eq=False)
 class RunFiles:
-    """Tables of a run. errors maps a case to its errors.csv; summary has one row per case; sweep may be empty."""
+    """Tables of a run. errors maps a case to its errors.csv; summary has one row per case; sweep may be empty.
+
+    planned : frames over all validation cases, those without a result among them, as far as that is known.
+    """
 
     errors: dict[str, pd.DataFrame]
     summary: pd.DataFrame
     sweep: pd.DataFrame
+    planned: int = 0
 
 
 def case_frame_map(run: RunFiles) -> Drawing | None:
@@ -50,10 +56,20 @@ def case_frame_map(run: RunFiles) -> Drawing | None:
     bar: Look = {"shrink": share, "anchor": (0.0, 1.0), "aspect": 12, "fraction": 0.04}
     look: Look = {"edgecolors": "white", "linewidth": 0.4 if len(cases) <= _MAX_NAMES else 0.0}
     heat_map(axes, grid, edges, "95th percentile, mm", error_scale(), bar, **look)
+    if grid.shape[1] <= _MOST_NUMBERED and len(cases) <= _MAX_NAMES:
+        _numbers(axes, grid)
     axes.plot(frames[failed], rows[failed], "x", color=BAD, markersize=5)
     axes.set_xlabel("frame")
     whole_numbers(axes.xaxis)
     return Drawing(figure, table)
+
+
+def _numbers(axes: Axes, grid: NDArray[np.float64]) -> None:
+    """Write into each cell what it holds: of a scale from 0.02 to 2 mm, 0.3 and 1.3 are two shades of one colour."""
+    for row, frame in np.argwhere(np.isfinite(grid)):
+        value = float(grid[row, frame])
+        text = f"{value:.2f}" if value < 9.995 else f"{value:.0f}"
+        axes.text(frame, row, text, ha="center", va="center", fontsize=7, color="white")
 
 
 def cases_by_error(run: RunFiles) -> Drawing | None:

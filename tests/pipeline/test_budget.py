@@ -40,8 +40,9 @@ from pipeline.simulate.way import Stop, Way
 from pipeline.study.manifest import ManifestError, read_manifest
 from reports import tables
 from reports.figures import figures_of
-from reports.schema import BUDGET, ENTRIES, ERRORS, POINTS, SUMMARY
+from reports.schema import BUDGET, ENTRIES, ERRORS, POINTS, SUMMARY, WIRE_LINES
 from solver import Grid
+from tests.reports.reading import read_vtp
 
 FIGURES = ("budget", "error_over_u")
 WIRE = Wire("w", 0.18, [(0.0, 0.5), (30.0, 5.0)], [(0.0, 0.12), (8.0, 0.12), (8.0, 0.0)])
@@ -382,6 +383,23 @@ def test_the_table_by_source_adds_up_and_the_four_entries_are_there(out: Path) -
     assert len(errors) == entries["frames"].iloc[0]
     assert entries["rms_mm"].iloc[0] == pytest.approx(pooled, abs=1e-6), "the first row is the run's own"
     assert entries["rms_mm"].nunique() == 4
+
+
+def test_the_lines_carry_what_an_error_is_divided_by(out: Path) -> None:
+    """They had the trace's standard deviation alone, as u_mm: in ParaView everybody divided the error by that."""
+    case = out / "cases" / "bend"
+    points = tables.read(case / "points.csv.gz", POINTS)
+    for number, samples in points.groupby("frame"):
+        arrays = read_vtp(case / "view" / f"wire_simulated_{number:03d}.vtp").point_arrays
+        assert list(arrays) == ["error_mm", "arc_mm", "contact_force_N", "trace_sigma_mm", "u_val_mm"]
+        assert set(arrays) <= set(WIRE_LINES.names)
+        scored = np.isfinite(arrays["error_mm"])
+        assert scored.sum() == len(samples)
+        np.testing.assert_allclose(arrays["u_val_mm"][scored], samples["u_val_mm"], rtol=1e-6)
+        assert np.isnan(arrays["u_val_mm"][~scored]).all()
+    assert list(read_vtp(case / "view" / "wire_traced_000.vtp").point_arrays) == ["arc_mm", "trace_sigma_mm"]
+    bare = read_vtp(out / "bare" / "cases" / "bend" / "view" / "wire_simulated_000.vtp").point_arrays
+    assert "u_val_mm" not in bare
 
 
 def test_the_pages_show_it(out: Path) -> None:

@@ -114,6 +114,34 @@ def test_a_damaged_case_does_not_improve_the_share_either(study: Path) -> None:
     assert (row["status"], row["role"], row["frames"], row["within_1mm"]) == ("damaged", "validation", 2, 0.0)
 
 
+def test_a_case_without_a_result_is_a_failure_and_its_frames_were_planned(
+    study: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Of three of four shards overall.csv said 9 of 9 frames ok, and failures.csv was empty."""
+    before = overall(found_cases(study))
+    names = ["a", "b", "c", "d", "tuned", "e", "learnt"]
+    info = {"planned": names, "to_score": {"a": 3, "b": 2, "c": 2, "d": 2, "e": 4}, "config": {}}
+    (study / "run.1-2.json").write_text(json.dumps(info), encoding="utf-8")
+    assert main(["report", str(study), "--overview"]) == 1
+    assert "2 cases without a result (failures.csv)" in capsys.readouterr().out
+    failures = pd.read_csv(study / "failures.csv", keep_default_na=False)
+    assert failures[["case", "stage", "status", "log"]].to_numpy().tolist() == [
+        ["e", "run", "not_run", ""],
+        ["learnt", "run", "not_run", ""],
+    ]
+    assert "copy the folder of the shard" in failures["message"][0]
+    whole = pd.read_csv(study / "overall.csv").iloc[0]
+    assert (whole["frames"], whole["frames_ok"], whole["frames_failed"]) == (13, 7, before["frames_failed"] + 4)
+    assert whole["within_1mm"] == pytest.approx(7 / 13)
+    assert whole["rms_mm"] == pytest.approx(before["rms_mm"])
+    page = (study / "index.html").read_text(encoding="utf-8")
+    assert "shares are of all planned frames, theirs among them" in page
+    curve = pd.read_csv(study / "figures" / "planned_within.csv")
+    assert curve.loc[curve["case"].isna(), "share_of_planned"].max() == pytest.approx(7 / 13)
+    aggregate(study, info, "run.1-2.json")  # a shard that has just run: others may be at work on the rest
+    assert pd.read_csv(study / "overall.csv")["frames"][0] == before["frames"]
+
+
 def test_a_trace_is_trusted_whatever_the_solver_said_of_its_wire(study: Path) -> None:
     """As ``Frame.trusted_curve``: a list of statuses had none of the solver's own."""
     traced = {case.result.case: case.traced_mm for case in found_cases(study)}

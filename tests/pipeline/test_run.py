@@ -607,11 +607,17 @@ def test_results_do_not_depend_on_workers_or_shards(short: Path, tmp_path: Path)
     assert run(both, tmp_path / "pool", "-j", "2", "--no-cache", *more) == 0
     for shard in ("1/2", "2/2"):
         assert run(both, tmp_path / shard[0], "--shard", shard, *more) == 0
+        assert len(pd.read_csv(tmp_path / shard[0] / "failures.csv")) == 0, "others may be at work on the rest"
         shutil.copytree(tmp_path / shard[0], tmp_path / "shards", dirs_exist_ok=True)
+        if shard == "1/2":  # as if the other were lost
+            assert main(["report", str(tmp_path / "shards"), "--overview"]) == 1
+            assert list(pd.read_csv(tmp_path / "shards" / "failures.csv")["status"]) == ["not_run"]
+            whole = pd.read_csv(tmp_path / "shards" / "overall.csv").iloc[0]
+            assert (whole["frames"], whole["frames_ok"]) == (2 * whole["frames_ok"], whole["frames_ok"])
     assert main(["report", str(tmp_path / "shards"), "--overview"]) == 0
     assert not (tmp_path / "shards" / "cases" / "second" / "report.html").exists()
     assert differences(tmp_path / "pool" / "cases", tmp_path / "shards" / "cases") == []
-    for name in ("summary.csv", "overall.csv", "sweep.csv"):
+    for name in ("summary.csv", "overall.csv", "failures.csv", "sweep.csv"):
         assert (tmp_path / "shards" / name).read_bytes() == (tmp_path / "pool" / name).read_bytes(), name
     assert len(pd.read_csv(tmp_path / "pool" / "timings.csv")) == 2
     table = tables.read(tmp_path / "pool" / "cases" / "second" / "errors.csv", ERRORS)

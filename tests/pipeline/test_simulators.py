@@ -20,7 +20,7 @@ from reports import tables
 from reports.case_page import render_case
 from reports.doubts import AMONG, COUNT_AS, MADE_FROM_TRACES
 from reports.run_page import render_index
-from reports.schema import ERRORS, POINTS, SIMULATORS, SUMMARY, WHERE
+from reports.schema import ERRORS, FAILURES, POINTS, SIMULATORS, SUMMARY, WHERE
 from reports.simulators import _where, in_common, render_simulators
 from reports.verdict import Doubt, verdict
 
@@ -288,10 +288,15 @@ def test_the_page_says_how_good_each_is_and_what_was_warned_of(compared: Path) -
         path = folder / "cases" / "c0" / "result.json"
         own = ["a faint frame", *["3 frames: with x and y turned most would not: are they RAS?"] * (name == "worse")]
         path.write_text(json.dumps(json.loads(path.read_text(encoding="utf-8")) | {"warnings": own}), encoding="utf-8")
+        if name == "worse":
+            why = {"case": "c0", "status": "curve_missing", "sentence": "there is no wire", "message": "no file"}
+            tables.write(folder / "failures.csv", FAILURES, [why | {"frame": frame} for frame in (1, 3)])
     page = render_simulators(compared).read_text(encoding="utf-8")
     assert '<span class="status poor">worse than a guess</span>' in page
     assert page.count('<span class="status good">ok</span>') == 1
-    assert "On 21 of 24 frames: The wire of worse lies" in page
+    assert "On 21 of 24 planned frames alone the wire of worse lies" in page
+    assert "<li>c0, frames 1, 3: curve_missing: there is no wire</li>" in page, "it listed them without a reason"
+    assert '<a href="simulators/worse/index.html#failures">all failures, and what to do</a>' in page
     assert "c0: 3 frames: with x and y turned most would not: are they RAS?" in page
     assert "a faint frame" not in page
 

@@ -23,6 +23,7 @@ def test_the_reference_and_the_shown_frame_are_opened() -> None:
     found, said = _scans_of(Known(scans=Scans(header("reference.mha"), frames)), shown=1)
     assert found == {"reference": Path("reference.mha"), "frame 1": Path("frame_1.nii.gz")}
     assert "other frames' scans are opened by hand" in said
+    assert "after a move write the new folder into fileName in scene.mrml" in said
 
 
 @pytest.mark.parametrize(

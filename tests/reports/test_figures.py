@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pandas as pd
 import pytest
@@ -23,7 +24,7 @@ from reports.figures._style import STAGE_COLOURS, lines, predictors
 from reports.figures.along_wire import _CLIP_PERCENTILE
 from reports.figures.simulators import _nearest, unbroken
 from reports.figures.simulators import colours as colours_of
-from reports.frames_file import FrameArrays, ScanCrop, frame_numbers, read_frame, read_scan, write_frames
+from reports.frames_file import FrameArrays, ScanCrop, Straightened, frame_numbers, read_frame, read_scan, write_frames
 from reports.page import draw_sections
 from reports.schema import BUDGET, ENTRIES, ERRORS, OURS, POINTS, SUMMARY, SWEEP, TIMINGS
 from reports.verdict import NEVER_NEAREST
@@ -235,12 +236,26 @@ def test_one_scored_frame_shows_its_predictors(tmp_path: Path) -> None:
     assert all(line.get_marker() not in ("", "None", None) for line in lines)
 
 
-def test_the_clamps_reach_is_blank_as_it_is_not_scored(tmp_path: Path) -> None:
+def test_the_cells_of_few_frames_have_their_numbers(tmp_path: Path) -> None:
+    """0.27 and 1.26 mm were two shades of magenta."""
+    for frames, numbers in ((3, ["0.27", "1.26", "12"]), (40, [])):
+        out = write_run(tmp_path / str(frames), [FakeCase("c", frames=frames)])
+        errors = read_case(out / "cases" / "c").errors
+        errors.loc[:2, "p95_mm"] = [0.27, 1.256, 12.3]
+        summary = tables.read(out / "summary.csv", SUMMARY)
+        drawing = RUN_FIGURES["case_frame_map"](RunFiles({"c": errors}, summary, tables.read_if_there(None, SWEEP)))
+        assert drawing is not None
+        assert [text.get_text() for text in drawing.figure.axes[0].texts] == numbers
+
+
+def test_the_clamps_reach_is_grey_as_it_is_not_scored(tmp_path: Path) -> None:
     case = _heat_case(tmp_path)
     case = replace(case, samples=case.points[case.points["arc_mm"] >= 2.0])
     drawing = CASE_FIGURES["error_along_wire"](case)
     assert drawing is not None
     assert drawing.table["arc_mm"].min() == pytest.approx(2.0, abs=0.25)
+    grey = [bar.get_width() for bar in drawing.figure.axes[0].patches]
+    assert grey == pytest.approx([2.0, 0.0, 2.0], abs=0.25), "what was white in front could as well be beyond a tip"
 
 
 @pytest.mark.parametrize("direction", [np.eye(3), TURN], ids=["aligned", "oblique"])
@@ -335,6 +350,21 @@ def test_a_budget_is_drawn_by_source_and_by_entry(tmp_path: Path) -> None:
     assert CASE_FIGURES["budget"](handed_in) is None, "it is of our solver's wire"
 
 
+def test_only_what_was_computed_of_a_budget_is_drawn(tmp_path: Path) -> None:
+    """With budget.members_alone = 4 eight names stood beside no bar, the first of them on the frame."""
+    rows: list[dict[str, Any]] = [{"source": name, "sigma": ""} for name in ("clamp", "roll")]
+    rows += [{"source": n, "sigma": "", "u_mm": 0.1, "distal_u_mm": 0.2} for n in ("inputs", "u_val", "error")]
+    tables.write(tmp_path / "budget.csv", BUDGET, rows)
+    drawing = CASE_FIGURES["budget"](_empty_case(tmp_path))
+    assert drawing is not None
+    (axes,) = drawing.figure.axes
+    assert [text.get_text() for text in axes.get_yticklabels()] == ["inputs", "all: u val", "error"]
+    assert axes.get_ylim() == (2.5, -0.5)
+    assert len(drawing.table) == 5
+    said = [s["read"] for s in draw_sections("case", _empty_case(tmp_path), tmp_path, False) if s["figure"] == "budget"]
+    assert "Inputs without a bar were not computed alone" in said[0]
+
+
 def test_no_caption_speaks_of_u_val_where_no_bar_is_of_it(tmp_path: Path) -> None:
     """What a bad one looks like was told of twice u val beside the marks of clamp and depth alone."""
     entry = {"clamp": "estimated", "depth": "traced", "frames": 3, "rms_mm": 0.1, "distal10_rms_mm": 0.2}
@@ -368,6 +398,20 @@ def test_release_frames_show_both_probabilities(tmp_path: Path) -> None:
     assert drawing.table["frame"].tolist() == [1]
     lines = drawing.figure.axes[0].get_lines()
     assert [list(line.get_ydata()) for line in lines] == [[0.7], [0.3]]
+
+
+@pytest.mark.parametrize(
+    ("direction", "labels"),
+    [
+        (np.eye(3), ["x, towards left, mm", "y, towards back, mm", "z, towards head, mm"]),
+        (np.diag([-1, -1, 1]), ["axis 0, towards right, mm", "axis 1, towards front, mm", "axis 2, towards head, mm"]),
+        (TURN, ["axis 0, about front, mm", "axis 1, about head, mm", "axis 2, about right, mm"]),
+    ],
+)
+def test_the_axes_of_an_oblique_scan_say_which_way_they_run(direction: np.ndarray, labels: list[str]) -> None:
+    """They were called array axis 0, 1 and 2."""
+    view = _planes.whole(ScanCrop(np.ones(3), np.zeros(3), direction, (4, 4, 4)))
+    assert [view.label(axis) for axis in range(3)] == labels
 
 
 def test_projections_choose_first_middle_last_and_worst(tmp_path: Path) -> None:
@@ -417,6 +461,26 @@ def test_frames_file_reads_back(tmp_path: Path) -> None:
     np.testing.assert_array_equal(frame.traced_mm, curve + 11)
     np.testing.assert_array_equal(frame.mips[0], picture)
     assert frame.simulated_mm is None
+
+
+def test_every_dataset_of_a_frames_file_says_its_unit(tmp_path: Path) -> None:
+    """A covariance had "1", a projection nothing."""
+    picture, square = np.zeros((4, 4), np.uint8), np.zeros((2, 3, 3))
+    arrays = {"traced_mm": square[0], "contact_force_N": square[0], "trace_flags": np.zeros(3)}
+    straight = Straightened(np.zeros((2, 4, 4), np.uint8), 0.5, 0.2, np.array([1.0, 0.0, 0.0]))
+    frame = FrameArrays(0, covariance_mm2=square, mips={0: picture}, straightened=straight, **arrays)
+    scan = ScanCrop(np.ones(3), np.zeros(3), np.eye(3), (4, 4, 4), {1: picture})
+    write_frames(tmp_path / "frames.h5", scan, [frame])
+    found: dict[str, str] = {}
+
+    def look(name: str, one: Any) -> None:
+        if isinstance(one, h5py.Dataset):
+            found[name.split("/")[-1]] = one.attrs["unit"]
+
+    with h5py.File(tmp_path / "frames.h5") as file:
+        file.visititems(look)
+    grey = dict.fromkeys(("lumen_mip_1", "mip_0", "straightened", "trace_flags"), "1")
+    assert found == grey | {"traced_mm": "mm", "contact_force_N": "N", "covariance_mm2": "mm^2"}
 
 
 def test_colours_are_told_apart_by_dichromats() -> None:

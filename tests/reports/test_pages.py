@@ -242,7 +242,7 @@ def test_why_frames_failed_is_said_of_them_alone(run: Path) -> None:
     """Below the name of a case their reason stood as if it were of all frames, and again among the failures."""
     page = (run / "cases" / FAILED / "report.html").read_text(encoding="utf-8")
     said = re.findall(r'<p class="verdict">(.*?)</p>', page, re.S)[0]
-    assert said.startswith("4 of 6 frames have a result. The simulated wire lies")
+    assert said.startswith("On 4 of 6 planned frames alone the simulated wire lies")
 
 
 @pytest.mark.usefixtures("scarce")

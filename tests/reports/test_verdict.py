@@ -174,8 +174,9 @@ def test_worse_is_said_where_the_whole_interval_is(low: float | None, high: floa
 def test_the_verdict_says_of_how_many_planned_frames_it_speaks() -> None:
     """Half the frames lost took the partners of a predictor: the verdict became better (0.926 instead of 0.563)."""
     row = {"rms_mm": 0.2, "skill_strongest": 0.9, "strongest_null": "centreline", "frames": 12, "frames_ok": 6}
-    assert "The wire is better" in verdict(row)
-    assert "This speaks of 6 of 12 planned frames alone" in verdict(row)
+    assert verdict(row).startswith("On 6 of 12 planned frames alone the simulated wire lies 0.200 mm"), "it came last"
+    assert "On these frames the wire is better (skill 0.900) than" in verdict(row)
+    assert "The wire is better (skill 0.900) than" in verdict(row | {"frames_ok": 12})
     assert "weaker without the others" in verdict(row)
     assert "planned" not in verdict(row | {"frames_ok": 12})
 

@@ -176,7 +176,50 @@ def manifest() -> str:
             default = "" if default in ("null", '""', "[]") else default
             rows.append((f"`{key}`", meaning(key, name), in_words(value, null=False), default))
         parts += [f"## `{title}`\n", table(("key", "meaning", "allowed", "default"), rows)]
-    return "\n".join(parts)
+    return "\n".join([*parts, *truth()])
+
+
+TRUTH = {
+    "scene, why": ("-", "name of the scene, and what it tries"),
+    "entry_mm, entry_direction": ("mm, 1", "where the true wire is held, and where it points there"),
+    "expected_status": ("-", "of each frame, what a run should say"),
+    "quality": ("-", "how well the true wires were computed, by name"),
+    "frames": ("-", "a row for each scan with the wire, in their order:"),
+    "frames[].insertion_mm": ("mm", "arc length from the entry to the tip"),
+    "frames[].roll_deg": ("deg", "roll about entry_direction, right-handed"),
+    "frames[].points_mm": ("mm", "the true wire from the entry to the tip, [x, y, z] each, as the reference shows it"),
+    "frames[].residual_N": ("N", "largest unbalanced force at a node of it"),
+    "frames[].tip_jump_mm": (
+        "mm",
+        "how much further than the push its tip moved in one step since the last frame, at most: whether it snapped",
+    ),
+    "frames[].phantom_shift_mm": ("mm", "where the phantom moved: by how much in this frame's own scan"),
+}
+"""What the keys of truth.json mean, with their units."""
+
+
+def truth() -> list[str]:
+    rows = [(f"`{key}`", *told) for key, told in TRUTH.items()]
+    return [
+        "## truth.json\n",
+        "What `wireval synth` writes for the key `truth`: the wires that it painted into the scans, LPS mm. A run\n"
+        "reads `frames[].points_mm` alone, of a file of your own, too, and fills the columns truth_* and trace_* of\n"
+        "errors.csv from it; nothing else sees it.\n",
+        table(("key", "unit", "meaning"), rows),
+    ]
+
+
+ASIDE = {
+    schema.WIRE_LINES.file: (
+        "Arrays of the points of a line, for ParaView and 3D Slicer. KIND is traced, simulated or true; NNN is the\n"
+        "frame, which is ParaView's time in the .pvd files.\n"
+        "A simulated wire that was compared has its joints within the clamp's reach here, which are not scored (NaN),\n"
+        "then the points of points.csv.gz, at which the errors are. In [frames.h5](frames.md) `simulated_mm` and\n"
+        "`contact_force_N` are at the joints of the solver, `error_mm` and `arc_mm` at the compared points alone:\n"
+        "therefore the numbers of points differ.\n",
+    )
+}
+"""What is said of a file before its columns."""
 
 
 def columns() -> str:
@@ -189,7 +232,7 @@ def columns() -> str:
     ]
     for one in (value for value in vars(schema).values() if isinstance(value, Table)):
         rows = [(f"`{column.name}`", column.unit, column.kind, column.meaning) for column in one]
-        parts += [f"## {one.file}\n", table(("column", "unit", "kind", "meaning"), rows)]
+        parts += [f"## {one.file}\n", *ASIDE.get(one.file, ()), table(("column", "unit", "kind", "meaning"), rows)]
     return "\n".join(parts)
 
 
@@ -279,6 +322,7 @@ def frames() -> str:
     parts = [
         *("# frames.h5\n", NOTE, f"```text\n{text}\n```\n"),
         f"Datasets of a frame, as far as it has them:\n\n```text\n{of_a_frame}\n```\n",
+        "The lines in `view/` have other numbers of points, and [arrays of their own](columns.md).\n",
         *("Attributes of the file:\n", table(("name", "value"), rows)),
     ]
     return "\n".join(parts)
