@@ -49,7 +49,7 @@ def render_simulators(out_dir: Path, embed: bool = False) -> Path:
             | _said(alone[name], folder, alien[name], copied.get(name, ""), few=name in few)
             for name, folder in folders.items()
         ],
-        "ours": OURS,
+        "ours": OURS if OURS in folders else "",
         "interval": next(iter(table["interval"].dropna()), ""),
         "simulators": grid,
         "few": in_common(files.simulators),

@@ -39,6 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_calibrated(parser)
     of = "the overall.csv of any simulator but the solver itself, or of the one that is named,"
     add_gates(parser, of, metavar="[NAME:]COLUMN>VALUE")
+    add("--without-own", action="store_true", help="judge these wires alone: the solver's own are not simulated")
     add("--fresh", action="store_true", help="compute every case again")
     add("--embed", action="store_true", help="put the pictures into the pages: one file a page")
     add_quiet(parser)
@@ -50,23 +51,20 @@ def main(args: argparse.Namespace) -> int:
     from pipeline.run.simulators import side_by_side
     from pipeline.status import InputError
     from pipeline.study.check import check
-    from pipeline.study.others import named
     from reports.inside import misleading_links
-    from reports.schema import OURS, SIMULATORS, WHERE
+    from reports.schema import SIMULATORS, WHERE
     from reports.simulators import PAGE
     from reports.what_next import warned
 
-    gates = [gate(text, [*named(args.curves), OURS]) for text in args.fail_if]
+    gates = [gate(text, _judged_names(args)) for text in args.fail_if]
     plans = {name: replace(p, gates=tuple(g for g in gates if g.asks(name))) for name, p in _plans(args).items()}
     found = {name: check(plan.cases, plan.template.settings.config) for name, plan in plans.items()}
-    theirs = [f"{name}: {text}" for name, of in found.items() for text in of if text not in found[OURS]]
-    problems = [*misleading_links(args.out), *found[OURS], *theirs]
-    if problems:
+    if problems := [*misleading_links(args.out), *said_once(found)]:
         raise InputError(problems)
     (args.out / "simulators").mkdir(parents=True, exist_ok=True)
     for earlier in (SIMULATORS.file, WHERE.file, PAGE):  # a score that is ended would leave them
         (args.out / earlier).unlink(missing_ok=True)
-    sys.stderr.writelines(_lost(args.curves, [case.id for case in plans[OURS].cases]))
+    sys.stderr.writelines(_lost(args.curves, [case.id for case in next(iter(plans.values())).cases]))
     totals = _judged(plans, args.quiet)
     warnings = said_once({name: warned(plan.out) for name, plan in plans.items()})
     aside(warnings, quiet=args.quiet)
@@ -142,7 +140,6 @@ def _plans(args: argparse.Namespace) -> "dict[str, Plan]":
     from pipeline.status import UsageError
     from pipeline.study.manifest import Manifest, read_manifest
     from pipeline.study.others import named
-    from reports.schema import OURS
     from reports.simulators import folders_in
 
     manifest, settings = read_manifest(file_of(args.manifest)), resolved_settings(args)
@@ -152,13 +149,15 @@ def _plans(args: argparse.Namespace) -> "dict[str, Plan]":
         raise UsageError([f"-o {args.out}: it is not empty and holds no score; name another folder"])
     names = named(args.curves)
     guard_apart(args.out, (path.parent for case in manifest.cases for path in named_files(case).values()))
-    if not args.fresh and (lost := [name for name in folders_in(args.out) if name not in (*names, OURS)]):
+    if not args.fresh and (lost := [name for name in folders_in(args.out) if name not in _judged_names(args)]):
         what = f"it holds a score of {', '.join(lost)}, which would be replaced"
-        raise UsageError([f"-o {args.out}: {what}; name another folder, name them again with --curves, or --fresh"])
+        do = "name another folder, name them again with --curves (wireval: no --without-own), or --fresh"
+        raise UsageError([f"-o {args.out}: {what}; {do}"])
     calibrated, notes = as_calibrated(manifest.cases, args.parameters, own=args.score_used)
     manifest = Manifest(manifest.path, calibrated)
     plans: dict[str, Plan] = {}
-    for name, place in {**names, OURS: None}.items():
+    for name in _judged_names(args):
+        place = names.get(name)
         cases = _with_wires(calibrated, place, args)
         out = args.out / "simulators" / name if plans else args.out
         how = {"fresh": args.fresh, "embed": args.embed, "quiet": args.quiet, "simulator": name}
@@ -167,6 +166,14 @@ def _plans(args: argparse.Namespace) -> "dict[str, Plan]":
     if not args.fresh:
         guard_score({name: (plan.out, plan.cases) for name, plan in plans.items()}, settings)
     return plans
+
+
+def _judged_names(args: argparse.Namespace) -> list[str]:
+    """The simulators, the solver itself last, where it is not left out."""
+    from pipeline.study.others import named
+    from reports.schema import OURS
+
+    return [*named(args.curves), *[OURS] * (not args.without_own)]
 
 
 def _with_wires(cases: "Sequence[Case]", place: Path | None, args: argparse.Namespace) -> "tuple[Case, ...]":

@@ -202,6 +202,25 @@ def test_a_case_without_a_folder_has_failed_and_the_others_count(
     assert "found neither bend/ nor bend.h5 in it" in capsys.readouterr().err
 
 
+@pytest.mark.usefixtures("undrawn")
+def test_wires_may_be_judged_alone(known: Known, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The solver's own were simulated with every score, by far the longest part of it where a lumen is kept."""
+    write_csv(tmp_path / "mine", known[1])
+    out = tmp_path / "out"
+    words = ["score", str(known[0]), "-o", str(out), "--curves", str(tmp_path / "mine"), *QUICK]
+    assert main([*words, "--without-own"]) == 0
+    assert "score of mine.  side by side: " in capsys.readouterr().out
+    assert list(pd.read_csv(out / "simulators.csv")["simulator"]) == ["mine"]
+    assert not (out / "simulators" / "wireval").exists()
+    assert "wireval is the solver of this project" not in (out / "simulators.html").read_text(encoding="utf-8")
+    assert errors_of(out)["null_centreline_rms_mm"].notna().all(), "held against the predictors all the same"
+    assert main(["report", str(out), "--overview"]) == 0
+    assert main([*words, "--without-own", "--fail-if", "wireval:rms_mm>1"]) == 2
+    assert main(words) == 0
+    assert main([*words, "--without-own"]) == 2
+    assert "a score of wireval, which would be replaced; name another folder" in capsys.readouterr().err
+
+
 ENTRY, ALONG = np.array([10.0, -40.0, 7.0]), np.array([0.0, 0.6, 0.8])
 
 
