@@ -87,9 +87,9 @@ def run_files(out_dir: Path, cases: Sequence[CaseFiles]) -> RunFiles:
     summary, sweep = (read_if_there(out_dir / table.file, table) for table in (SUMMARY, SWEEP))
     summary, found = _content.worst_first(summary), {case.name: case.errors for case in cases}
     names = dict.fromkeys([*summary["case"], *found])
-    planned = first_row(read_if_there(out_dir / OVERALL_FILE, SUMMARY)).get("frames", 0)
-    known = int(planned) if pd.notna(planned) else 0
-    return RunFiles({name: found[name] for name in names if name in found}, summary, sweep, known)
+    whole = first_row(read_if_there(out_dir / OVERALL_FILE, SUMMARY))
+    planned = int(whole["frames"]) if whole and _not_run_counted(out_dir) else 0
+    return RunFiles({name: found[name] for name in names if name in found}, summary, sweep, planned)
 
 
 def _is_tall(section: Mapping[str, Any]) -> bool:
@@ -149,10 +149,14 @@ def _not_counted(out_dir: Path) -> dict[str, str]:
     return {name: sentence(out_dir) for name, sentence in said.items()}
 
 
+def _not_run_counted(out_dir: Path) -> bool:
+    """Whether the tables count the frames of cases without a result: those of a shard that has just run do not."""
+    return bool(read_if_there(out_dir / FAILURES.file, FAILURES)["status"].eq("not_run").any())
+
+
 def _frames_not_run(out_dir: Path) -> str:
     """What becomes of the frames of cases without a result in the numbers of the page."""
-    table = read_if_there(out_dir / FAILURES.file, FAILURES)
-    if not (table["status"] == "not_run").any():
+    if not _not_run_counted(out_dir):
         return "Every number below is over the other cases alone, shares of planned frames, too."
     return "Errors below are over the other cases alone; shares are of all planned frames, theirs among them."
 

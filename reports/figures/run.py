@@ -26,7 +26,7 @@ _MAX_NAMES = 90  # more labels than that overlap at the largest height
 class RunFiles:
     """Tables of a run. errors maps a case to its errors.csv; summary has one row per case; sweep may be empty.
 
-    planned : frames over all validation cases, those without a result among them, as far as that is known.
+    planned : frames over all validation cases where some have no result, and so no row; else 0.
     """
 
     errors: dict[str, pd.DataFrame]
