@@ -22,8 +22,8 @@ class FrameStatus(Enum):
     TRACE_LEFT_LUMEN = "the traced curve leaves the lumen; check the lumen, the registration and trace settings"
     TRACE_AMBIGUOUS = "the wire can be followed in more than one way here; look at the picture before using it"
     TRACE_LOW_CONTRAST = (
-        "nothing at the entry stands out of the noise enough to be called the wire; check that entry_mm lies on it and "
-        "that the frame shows one, and not too faintly; then list a frame of a smaller depth before it, or scan with "
+        "nothing at the entry stands out of the noise enough to be called the wire: entry_mm is not on it, or the "
+        "frame shows none or too faintly; check both, then list a frame of a smaller depth before it, or scan with "
         "more dose"
     )
     TRACE_LEFT_SCAN = "the wire runs out of the scan: its tip, or a part before it, is not in this frame"
