@@ -567,7 +567,7 @@ def test_where_curves_are_looked_for(known: Known, tmp_path: Path, capsys: pytes
 def test_a_score_of_others_is_not_replaced(known: Known, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The same command with another --curves put its results in the place of the first ones."""
     one, two = write_csv(tmp_path / "one", known[1]), write_csv(tmp_path / "two", known[1])
-    words = ["score", str(known[0]), "-o", str(tmp_path / "out"), *QUICK]
+    words = ["score", str(known[0]), "-o", str(tmp_path / "out"), "--without-own", *QUICK]
     assert main([*words, "--curves", str(one)]) == 0
     kept = (tmp_path / "out" / "simulators.csv").read_bytes()
     assert main([*words, "--curves", str(two)]) == 2

@@ -238,7 +238,7 @@ def test_one_scored_frame_shows_its_predictors(tmp_path: Path) -> None:
 
 def test_the_cells_of_few_frames_have_their_numbers(tmp_path: Path) -> None:
     """0.27 and 1.26 mm were two shades of magenta."""
-    for frames, numbers in ((3, ["0.27", "1.26", "12"]), (40, [])):
+    for frames, numbers in ((3, ["0.27", "1.26", "12"]), (17, [])):
         out = write_run(tmp_path / str(frames), [FakeCase("c", frames=frames)])
         errors = read_case(out / "cases" / "c").errors
         errors.loc[:2, "p95_mm"] = [0.27, 1.256, 12.3]

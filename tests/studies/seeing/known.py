@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
-LARGE = ("0.9 mm wire, 0.1 mm voxels", "layered filling", "wire out of the round field of view")
+LARGE = (
+    "0.9 mm wire, 0.1 mm voxels",
+    "0.9 mm wire, voxels of 0.1 to 0.3 mm, no reference",
+    "layered filling",
+    "wire out of the round field of view",
+)
 """Of which one scene takes as long as ten others."""
 
 TRACED = [
