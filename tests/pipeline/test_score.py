@@ -134,6 +134,7 @@ def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("pipeline.run.case.draw", lambda *_: None)
 
 
+@pytest.mark.slow  # the bend above has the same at every commit
 @pytest.mark.usefixtures("undrawn")
 def test_a_third_party_in_a_bifurcation(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     manifest, out = synth("bifurcation", tmp_path / "study"), tmp_path / "out"

@@ -5,6 +5,7 @@ from __future__ import annotations
 LARGE = (
     "0.9 mm wire, 0.1 mm voxels",
     "0.9 mm wire, voxels of 0.1 to 0.3 mm, no reference",
+    "a piece of wire in the reference, where the wire ends",
     "layered filling",
     "wire out of the round field of view",
 )
