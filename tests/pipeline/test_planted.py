@@ -138,6 +138,7 @@ def test_the_scans_speak_against_what_is_stated_wrongly(
     assert all(said in text for text in found), found
 
 
+@pytest.mark.slow  # a whole study is run once more for it
 def test_a_reference_in_another_format_is_of_the_same_phantom(study: Path, out: Path, tmp_path: Path) -> None:
     """It was known by its file's bytes: saved again, a verdict of no better than a guess became: that is better."""
     folder = shutil.copytree(study, tmp_path / "study")
