@@ -41,20 +41,26 @@ def told(row: Any) -> str:
     """Simulator, case, frame and column of a row, its values and the allowed change. row : a Series of a comparison."""
     whose = [str(row["simulator"])] if "simulator" in row else []
     where = f"case {row['case']}" + ("" if pd.isna(row["frame"]) else f" frame {row['frame']}")
-    was, now = (f"{v:.4g}" if isinstance(v, float) else v for v in row[["before", "after"]])
+    was, now = _both(row)
     allowed = "" if pd.isna(row["allowed"]) else f" (allowed {row['allowed']:.4g})"
     return f"{', '.join([*whose, where])}, {row['column']} {was} -> {now}{allowed}"
 
 
 def change_of(row: Any) -> str:
     """A row's column and values with their unit, and the change that is allowed: what a build server shows of it."""
-    was, now = (f"{v:.4g}" if isinstance(v, float) else str(v) for v in (row["before"], row["after"]))
+    was, now = _both(row)
     column = ERRORS[row["column"]] if row["column"] in ERRORS.names else None
     if column is None or pd.isna(row["allowed"]):
         return f"{row['column']}: {was} -> {now}"
     unit = f" {column.unit}" * (column.unit not in ("1", "-", ""))
     way = WAYS.get(column.better, "either way")
     return f"{row['column']}: {was} -> {now}{unit} (allowed {row['allowed']:.4g}{unit} {way})"
+
+
+def _both(row: Any) -> tuple[str, str]:
+    """A row's values, of the first and of the second run."""
+    was, now = (f"{v:.4g}" if isinstance(v, float) else str(v) for v in (row["before"], row["after"]))
+    return was, now
 
 
 def how_many(rows: pd.DataFrame) -> str:

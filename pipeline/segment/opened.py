@@ -10,7 +10,7 @@ from pipeline.arrays.grids import in_memory_order, reorder
 from pipeline.model import Array, Curve, Lumen
 from pipeline.segment._kernels.solids import cones
 from pipeline.segment.contact import counted
-from pipeline.segment.pieces import Gap, between_pieces, crossed
+from pipeline.segment.pieces import Gap, between_pieces, crossed, spelt
 from solver.grid import Grid, read_only
 
 OUTSIDE_VOXELS = 1.0
@@ -103,10 +103,9 @@ def _outside(grid: Grid, curves: Sequence[Curve], allowed: float) -> tuple[list[
 def _told(said: Sequence[Place], allowed: float) -> str:
     """The places as the begin of a sentence."""
     deepest, place = max(said, key=lambda one: one[0])
-    where = ", ".join(f"{x:.1f}" for x in place)
     return (
         f"segment: traced wires ran up to {deepest:.2f} mm outside the lumen in {counted(said)}, allowed "
-        f"{allowed:.2f} and {SIGMAS:g} standard deviations; furthest at [{where}] mm"
+        f"{allowed:.2f} and {SIGMAS:g} standard deviations; furthest at {spelt(place)} mm"
     )
 
 

@@ -60,7 +60,7 @@ def in_pieces(distance: Grid, entry_mm: ArrayLike) -> list[str]:
     return [
         f"segment: the given lumen is in {count} pieces, and no simulated wire goes from one to another: one begins "
         f"{apart[closest]:.1f} mm (between the middles of voxels) from that which the wire enters, near "
-        f"{_said(middle)} mm; is a slice missing there, or a part of the surface? Close the gap in the file"
+        f"{spelt(middle)} mm; is a slice missing there, or a part of the surface? Close the gap in the file"
     ]
 
 
@@ -73,19 +73,19 @@ def between_pieces(distance: Grid, curves: Sequence[Curve]) -> list[Gap]:
         at = map_coordinates(pieces, index.T, order=0, mode="nearest")
         for first, last in pairwise(np.flatnonzero(at > 0)):
             if at[first] != at[last]:
-                (one, here), (other, there) = (_middle(distance, pieces == at[n], index[n]) for n in (first, last))
+                (one, here), (other, there) = (_middle(distance, pieces, at[n], index[n]) for n in (first, last))
                 ends = curve.points_mm[[first, last]]
                 long = float(np.linalg.norm(ends[1] - ends[0]))
                 gaps.append(Gap(long, ends.mean(axis=0), np.array([one, other]), (here, there)))
     return gaps
 
 
-def _middle(distance: Grid, piece: NDArray[np.bool_], near: Array) -> tuple[Array, float]:
-    """Index (3,) of the place of a piece farthest from its wall, close to an index, and how far that is, mm."""
+def _middle(distance: Grid, pieces: NDArray[np.int32], number: int, near: Array) -> tuple[Array, float]:
+    """Index (3,) of a numbered piece's place farthest from its wall, close to an index, and how far that is, mm."""
     reach = np.ceil(AROUND_MM / distance.spacing_mm)
     low = np.maximum(np.rint(near - reach).astype(int), 0)
     box = tuple(slice(a, b) for a, b in zip(low, np.rint(near + reach).astype(int) + 1, strict=True))
-    depth = np.where(piece[box], -distance.values[box], 0.0)
+    depth = np.where(pieces[box] == number, -distance.values[box], 0.0)
     place = np.array(np.unravel_index(np.argmax(depth), depth.shape))
     return (low + place).astype(float), float(depth.max())
 
@@ -96,7 +96,7 @@ def crossed(gaps: Sequence[Gap]) -> str:
     times = f"{len(gaps)} time{'s' * (len(gaps) != 1)}"
     return (
         f"segment: traced wires run from one piece of the given lumen to another, {times}, over at most "
-        f"{longest.long_mm:.2f} mm; furthest at {_said(longest.middle_mm)} mm"
+        f"{longest.long_mm:.2f} mm; furthest at {spelt(longest.middle_mm)} mm"
     )
 
 
@@ -106,5 +106,6 @@ def _pieces(distance: Grid) -> NDArray[np.int32]:
     return numbers
 
 
-def _said(place: Array) -> str:
+def spelt(place: Array) -> str:
+    """A place (3,), mm, to a tenth."""
     return "[" + ", ".join(f"{x:.1f}" for x in place) + "]"

@@ -6,13 +6,11 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.model import Clamp
+from pipeline.run.stages.depths import FEWEST
 from pipeline.run.stages.known import Context, Frame
 from pipeline.simulate.clamp import depth_from
 from pipeline.simulate.way import Stop, Way
 from pipeline.status import FrameStatus
-
-FEWEST = 4
-"""Traced frames from which on it is asked by how much all are deeper than stated: two of fewer may be off at once."""
 
 
 def stop_of(frame: Frame) -> Stop:
