@@ -12,6 +12,8 @@ from pipeline.arrays.lattice import entry_point, grown, kernel, unravelled
 
 QUEUED = 2
 """Bit of ``inside`` that marks a voxel waiting to hand on its foot (closest point); used by :func:`propagate` alone."""
+APART = 1.5
+"""Voxels: feet lie one voxel apart, and some are missing."""
 
 
 class Owned(NamedTuple):
@@ -103,8 +105,10 @@ def lost_feet(box: Owned, voxels: NDArray[Any], foot: NDArray[Any], good: NDArra
 
 
 @kernel
-def _from_foot(x: float, y: float, z: float, p: NDArray[Any], n: NDArray[Any], bend: float) -> float:
+def _from_foot(x: float, y: float, z: float, p: NDArray[Any], n: NDArray[Any], bend: float, most: float) -> float:
     """Distance of a point from the sphere of curvature ``bend`` that osculates the surface at its foot p.
+
+    most : square of how far along the surface the closest point may lie from the foot, mm^2.
 
     For bend 0 (a surface of flat facets, closest points exact) it is the distance to the foot.
     """
@@ -117,7 +121,8 @@ def _from_foot(x: float, y: float, z: float, p: NDArray[Any], n: NDArray[Any], b
         return float(far)
     # no point is further from the surface than from its foot, however bent the surface is there
     near = along + 0.5 * bend * max(0.0, square - along * along) / lift
-    return float(min(abs(near), far))
+    # nor, since feet lie close together, much nearer to it: beyond a rim of the wall nothing is left of the sphere
+    return float(min(max(abs(near), np.sqrt(max(0.0, square - most * lift))), far))
 
 
 @entry_point
@@ -131,6 +136,7 @@ def distances(
     """
     (owner, inside, spacing), (foot, normal, bend) = box, wall
     hx, hy, hz = spacing[0], spacing[1], spacing[2]
+    apart = (APART * max(hx, hy, hz)) ** 2
     skip = (owner.shape[0] - out.shape[0]) // 2
     for a in range(out.shape[0]):
         i = a + skip
@@ -138,8 +144,10 @@ def distances(
             j = b + skip
             for c in range(out.shape[2]):
                 k = c + skip
-                m = owner[i, j, k] - 1
+                m, within = owner[i, j, k] - 1, inside[i, j, k] & 1
                 d = outer
                 if m >= 0:
-                    d = _from_foot(i * hx, j * hy, k * hz, foot[m], normal[m], bend[m])
-                out[a, b, c] = -d if inside[i, j, k] & 1 else min(d, outer)
+                    # deep inside, feet are few: a voxel may have taken over one from across the lumen
+                    most = np.inf if within else apart
+                    d = _from_foot(i * hx, j * hy, k * hz, foot[m], normal[m], bend[m], most)
+                out[a, b, c] = -d if within else min(d, outer)
