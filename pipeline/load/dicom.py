@@ -17,7 +17,7 @@ from pipeline.load import foreign
 from pipeline.load.config import LoadConfig
 from pipeline.load.geometry import Box, Header, LoadError, Source, unusable
 from pipeline.load.guard import is_folder, require_room
-from pipeline.load.order import natural_key
+from pipeline.load.order import in_order
 from pipeline.load.slices import Plane, dataset, grey, is_dicom, is_image, planes_of
 from pipeline.load.voxels import read_box, scaled
 
@@ -80,7 +80,7 @@ Series = dict[str, list[tuple[Path, Any]]]
 
 def series_in(folder: Path) -> tuple[Series, list[str]]:
     """The image series of a folder's files, and the names of files that cannot be read."""
-    entries = sorted(folder.iterdir(), key=lambda p: natural_key(p.name))
+    entries = in_order(folder.iterdir(), lambda p: p.name)
     if len(entries) > MOST_FILES:
         raise unusable(folder, f"{len(entries)} entries; allowed: {MOST_FILES} files; keep one series a folder")
     lost: list[str] = []
@@ -97,7 +97,7 @@ def series_in(folder: Path) -> tuple[Series, list[str]]:
             lost.append(path.name)
         elif kind:
             series.setdefault(str(data.get("SeriesInstanceUID", "")), []).append((path, data))
-    return dict(sorted(series.items(), key=lambda one: natural_key(_called(*one)))), lost
+    return dict(in_order(series.items(), lambda one: _called(*one))), lost
 
 
 def _called(uid: str, files: list[tuple[Path, Any]]) -> str:
@@ -115,7 +115,7 @@ def _planes_in(folder: Path, wanted: str) -> list[Plane]:
     images = {uid: files for uid, files in series.items() if not wanted or uid == wanted}
     if len(images) != 1:
         groups = "".join(f"\n    {_called(*one)}: {len(one[1])} files" for one in series.items())
-        below = [d.name for d in sorted(folder.iterdir(), key=lambda p: natural_key(p.name)) if d.is_dir()]
+        below = [d.name for d in in_order(folder.iterdir(), lambda p: p.name) if d.is_dir()]
         hint = (
             f"It has sub-folders: {', '.join(below[:5])}; name one of them, as in {folder.name}/{below[0]}.\n"
             if below

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from pipeline.load.config import LoadConfig
 from pipeline.load.geometry import Box, Header, Source, judged, require_same_geometry, unusable
 from pipeline.load.guard import require_room
-from pipeline.load.order import natural_key
+from pipeline.load.order import in_order
 from pipeline.load.voxels import LONGEST_AXIS
 
 AXES = ("z,y,x", "x,y,z")
@@ -26,7 +26,7 @@ def _volumes(file: h5py.File, source: Source) -> list[h5py.Dataset]:
     """The dataset named, or the 3-D datasets of the group named, in natural order."""
     node = _inside(file, source.dataset or "/volume", source)
     if isinstance(node, h5py.Group):
-        inside = [_inside(node, name, source) for name in sorted(node, key=natural_key)]
+        inside = [_inside(node, name, source) for name in in_order(node)]
         _require_volumes(node, inside, source)
         found = [item for item in inside if isinstance(item, h5py.Dataset) and item.ndim == 3]
         if found:
@@ -44,7 +44,7 @@ def _require_volumes(group: h5py.Group, inside: list[Any], source: Source) -> No
 
     Numbers, datasets of one axis, as of depths, and groups of such may stand beside volumes.
     """
-    for name, item in zip(sorted(group, key=natural_key), inside, strict=True):
+    for name, item in zip(in_order(group), inside, strict=True):
         what = _unlike_a_volume(item)
         if what:
             where = f"{group.name.rstrip('/')}/{name}"

@@ -14,7 +14,7 @@ from pipeline.load.config import LoadConfig
 from pipeline.load.dicom import series_in
 from pipeline.load.geometry import LoadError, unusable
 from pipeline.load.guard import is_folder
-from pipeline.load.order import natural_key
+from pipeline.load.order import in_order
 from pipeline.load.slices import is_dicom, is_multiframe
 from pipeline.model import Array, Volume, Wall
 from pipeline.study.same_grid import apart
@@ -132,10 +132,10 @@ def _scans_in(folder: Path, stated: Path | None) -> tuple[Path | None, list[Path
 
     Raises LoadError where two scans have such a name and none is stated.
     """
-    below = [p for p in (*folder.iterdir(), *folder.glob("frames/*")) if _is_scan(p)]
+    scans = (p for p in (*folder.iterdir(), *folder.glob("frames/*")) if _is_scan(p))
+    below = in_order(scans, lambda p: p.relative_to(folder).as_posix())
     if not below and _is_scan(folder):
         return None, [folder], []
-    below.sort(key=lambda p: natural_key(p.relative_to(folder).as_posix()))
     named = [p for p in below if looks_wire_free(p)]
     if stated is None and len(named) > 1:
         names = " and ".join(p.relative_to(folder).as_posix() for p in named)

@@ -9,7 +9,7 @@ from pydantic.config import JsonDict
 
 from pipeline.load.geometry import LoadError
 from pipeline.load.guard import is_folder, size_of, status_of
-from pipeline.load.order import natural_key
+from pipeline.load.order import in_order
 from pipeline.load.wires import KINDS, kind_of
 from pipeline.ranges import Strict
 from pipeline.status import UsageError
@@ -91,7 +91,7 @@ def _matching(case: str, pattern: Path) -> list[str]:
 
 
 def _sorted(paths: Any) -> list[str]:
-    return [str(path) for path in sorted(paths, key=lambda path: natural_key(path.name))]
+    return [str(path) for path in in_order(paths, lambda path: path.name)]
 
 
 def _refuse(case: str, place: Path, why: str) -> list[str]:

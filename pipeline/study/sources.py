@@ -11,7 +11,7 @@ from pydantic_core import PydanticCustomError
 from pipeline.load import Source
 from pipeline.load.geometry import LoadError, Mask
 from pipeline.load.guard import read_toml, status_of
-from pipeline.load.order import natural_key
+from pipeline.load.order import in_order
 from pipeline.ranges import Strict
 from pipeline.status import InputError
 from pipeline.wording import saying
@@ -57,7 +57,7 @@ def _sources(value: Any, info: ValidationInfo) -> tuple[Source, ...]:
         matches = list(itertools.islice(base.glob(relative), MOST_MATCHES + 1))
     except (ValueError, NotImplementedError, OSError, RecursionError):
         raise saying(f"{info.field_name} = {value!r} is no pattern; write names with *, ? and [...]") from None
-    found = sorted(matches, key=lambda path: natural_key(path.relative_to(base).as_posix()))
+    found = in_order(matches, lambda path: path.relative_to(base).as_posix())
     if not found:  # said beside what else is wrong with the case's files
         return (source,)
     if len(found) > MOST_MATCHES:

@@ -14,7 +14,6 @@ from pydantic import TypeAdapter, ValidationError
 
 from pipeline.load import Header, LoadError, Source, read_header
 from pipeline.load.curves import read_truth
-from pipeline.load.order import natural_key
 from pipeline.model import Array
 from pipeline.ranges import Name
 from pipeline.study.devices import implausible
@@ -71,10 +70,6 @@ def test_defaults_paths_and_order(tmp_path: Path) -> None:
     assert case.lumen_seed_mm == (case.entry_mm,)
     assert case.wall.stiffness_N_mm2 == 2.0
     assert case.wire.rest_curvature_per_mm == 0.0
-
-
-def test_natural_order() -> None:
-    assert sorted(["a10", "a9", "b1", "a1"], key=natural_key) == ["a1", "a9", "a10", "b1"]
 
 
 @pytest.mark.parametrize(
