@@ -50,6 +50,14 @@ WORDED: tuple[tuple[str, Callable[[re.Match[str]], str]], ...] = (
 """Patterns of argparse's error messages, each with the function that rewords the match."""
 
 
+NOWHERE = {
+    "no locator available": "compiled code can be kept nowhere: neither the package's folder nor the user's cache "
+    "folder is writable; set NUMBA_CACHE_DIR to a folder that is",
+    "determine home directory": "the user has no home folder: set HOME, or XDG_CACHE_HOME to a folder for caches",
+}
+"""What numba and pathlib say in a container whose user is a mere number."""
+
+
 def _short(names: str) -> str:
     return names.partition("/")[0]
 
@@ -180,6 +188,11 @@ def _main(argv: Sequence[str] | None) -> int:
     except WriteError as error:
         print(error, file=sys.stderr)
         return FAILED
+    except RuntimeError as error:
+        what = next((said for words, said in NOWHERE.items() if words in str(error)), None)
+        if what is None:
+            raise
+        return complain([what], "the environment")
 
 
 def _kept(args: argparse.Namespace) -> str:

@@ -25,7 +25,11 @@ class Lasting:
     def write(self, text: str) -> int:
         """Write a text; returns its number of characters."""
         with self._without_reader():
-            self._stream.write(text)
+            try:
+                self._stream.write(text)
+            except UnicodeEncodeError:  # in the C locale, an umlaut in a path
+                known = self._stream.encoding
+                self._stream.write(text.encode(known, "backslashreplace").decode(known))
         return len(text)
 
     def writelines(self, lines: Iterable[str]) -> None:

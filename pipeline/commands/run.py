@@ -141,9 +141,9 @@ def _plan(args: argparse.Namespace) -> "Plan":
 
     if args.executor:  # workers elsewhere know nothing of this process's working folder
         args.manifest, args.out = args.manifest.absolute(), args.out.absolute()
-    guard_apart(args.out, [args.manifest])  # before an inferred manifest is written there
+    guard_apart(args.out, [args.manifest / INFERRED])  # before an inferred manifest is written there
     manifest = given(args, None if args.dry_run else args.out)
-    guard_apart(args.out, (path.parent for case in manifest.cases for path in named_files(case).values()))
+    guard_apart(args.out, (path for case in manifest.cases for path in named_files(case).values()))
     settings = resolved_settings(args)
     limits = _limits(args)
     cache = None if args.no_cache else default_root()

@@ -148,7 +148,7 @@ def _plans(args: argparse.Namespace) -> "dict[str, Plan]":
     if args.out.exists() and any(args.out.iterdir()) and not (args.out / "simulators").is_dir():
         raise UsageError([f"-o {args.out}: it is not empty and holds no score; name another folder"])
     names = named(args.curves)
-    guard_apart(args.out, (path.parent for case in manifest.cases for path in named_files(case).values()))
+    guard_apart(args.out, (path for case in manifest.cases for path in named_files(case).values()))
     if not args.fresh and (lost := [name for name in folders_in(args.out) if name not in _judged_names(args)]):
         what = f"it holds a score of {', '.join(lost)}, which would be replaced"
         do = "name another folder, name them again with --curves (wireval: no --without-own), or --fresh"

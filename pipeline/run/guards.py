@@ -21,12 +21,16 @@ WRITTEN = "cases", "sweep", "simulators", "figures"
 """Folders of an output in which a run writes, and removes what was there before."""
 
 
-def guard_apart(out: Path, folders: Iterable[Path]) -> None:
+def guard_apart(out: Path, inputs: Iterable[Path]) -> None:
     """Refuse an output folder that holds inputs: results would lie among the scans, and these would be removed.
 
-    folders : those that inputs lie in.
+    inputs : files, and folders of which every file is read. A folder for results is not to lie in such a one either.
     """
-    here, places = out.resolve(), {folder.resolve(): folder for folder in folders}
+    given = tuple(inputs)
+    here, places = out.resolve(), {path.parent.resolve(): path.parent for path in given}
+    for folder in (path for path in given if path.is_dir()):
+        if here.is_relative_to(folder.resolve()):
+            raise UsageError([f"-o {out}: all files in {folder} are read as a scan; name a folder outside of it"])
     if here in places:
         beside = here.with_name(f"{here.name}-out").name
         raise UsageError([f"-o {out}: this is the folder of the inputs; name another one for the results, as {beside}"])

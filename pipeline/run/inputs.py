@@ -16,10 +16,11 @@ from pipeline.status import FrameStatus, StageError
 from pipeline.study.manifest import Case
 from pipeline.study.sources import files_of
 
-State = tuple[int, int, int]
-"""Size, time of the last change, and number on its disk: a file that replaces another one has a number of its own.
+State = tuple[int, int, int, int]
+"""Size, times of the last change of content and of its entry, and number on its disk.
 
-The time of a folder changes with the files that are put into it."""
+A file that replaces another one has a number of its own; whoever puts back the time of its content (`rsync --inplace
+--times`) cannot put back that of its entry. The time of a folder changes with the files that are put into it."""
 
 
 @dataclass(frozen=True)
@@ -133,7 +134,7 @@ def _state(path: Path) -> State | None:
         stat = path.stat()
     except OSError:
         return None
-    return stat.st_size, stat.st_mtime_ns, stat.st_ino
+    return stat.st_size, stat.st_mtime_ns, stat.st_ctime_ns, stat.st_ino
 
 
 def _changed(path: Path) -> float:

@@ -11,6 +11,7 @@ import os
 import resource
 import signal
 import sys
+import tempfile
 import time
 from collections import deque
 from collections.abc import Callable, Generator, Iterator, Sequence
@@ -27,6 +28,11 @@ J = TypeVar("J")
 R = TypeVar("R")
 FIRST, PRELOADED = "pipeline.run.with_parent", "pipeline.run.case"
 """Imported once (1.5 s) by the server that workers are forked from."""
+PATHS = "PYTHONSAFEPATH", "PYTHONPATH"
+SOCKET_FOLDER = 70
+"""Longest path, bytes, of a folder for a socket: with the names that are added a path has 107 at most."""
+LONGEST_LOOK_S = 2.0
+"""Between checks that lie further apart this process was suspended, and its workers with it: so much of it counts."""
 LOOK_S = 0.1
 """Seconds between checks of a worker against its limits: for that long it may exceed them."""
 
@@ -69,11 +75,11 @@ class Worker(Generic[J, R]):
             self.process.start()
         theirs.close()
         self._job: list[J] = []
-        self._since, self._peak_mib = 0.0, 0.0
+        self._taken_s, self._looked, self._peak_mib = 0.0, 0.0, 0.0
 
     def give(self, job: J) -> None:
         """Send a job to the process. Should that have died meanwhile, ``outcome`` tells."""
-        self._job, self._since, self._peak_mib = [job], time.monotonic(), 0.0
+        self._job, self._taken_s, self._looked, self._peak_mib = [job], 0.0, time.monotonic(), 0.0
         with suppress(OSError):
             self.pipe.send(job)
 
@@ -88,7 +94,9 @@ class Worker(Generic[J, R]):
                 return Outcome(job, None, LOST, f"{LOST} ({_ended(self.process.exitcode)})", "worker_lost")
             return outcome
         self._peak_mib = max(self._peak_mib, resident_mib(self.process.pid))
-        broken = limits.broken(time.monotonic() - self._since, self._peak_mib)
+        now = time.monotonic()
+        self._taken_s, self._looked = self._taken_s + min(now - self._looked, LONGEST_LOOK_S), now
+        broken = limits.broken(self._taken_s, self._peak_mib)
         if not broken:
             return None
         self.end()
@@ -140,18 +148,32 @@ def resident_mib(process: int | None) -> float:
 
 def _start_server() -> None:
     """Start the server that workers are forked from, with one thread each: N times N threads slow each other down."""
-    before = {name: os.environ.get(name) for name in THREADS}
+    before = {name: os.environ.get(name) for name in (*THREADS, *PATHS)}
     one_thread()
+    # Python would look in the working folder first, where a user's own pipeline.py may lie
+    os.environ.update(PYTHONSAFEPATH="1", PYTHONPATH=os.pathsep.join(filter(None, sys.path)))
     try:
         multiprocessing.get_context("forkserver").set_forkserver_preload([FIRST, PRELOADED])
         resource_tracker.ensure_running()  # it lets signals through again
-        with _interrupts_wait():
+        with _interrupts_wait(), _short_paths():
             forkserver.ensure_running()
     finally:
         for name, value in before.items():
             os.environ.pop(name)
             if value is not None:
                 os.environ[name] = value
+
+
+@contextmanager
+def _short_paths() -> Iterator[None]:
+    """Let the server's socket lie in /tmp where the folder for temporary files has a path too long for a socket's."""
+    before = tempfile.gettempdir()
+    if len(os.fsencode(before)) > SOCKET_FOLDER:
+        tempfile.tempdir = "/tmp"
+    try:
+        yield
+    finally:
+        tempfile.tempdir = before
 
 
 @contextmanager

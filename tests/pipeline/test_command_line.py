@@ -20,6 +20,8 @@ import SimpleITK as sitk
 from pipeline.cli import main
 from pipeline.commands.given import _other_manifests
 from pipeline.run.gate import Gate, gate
+from pipeline.run.guards import guard_apart
+from pipeline.status import UsageError
 from pipeline.streams import Lasting
 from pipeline.study.explain import described
 from pipeline.study.settings import Config, SettingsError, parse_assignment, read_settings, resolve
@@ -331,6 +333,16 @@ def test_inputs_where_results_are_removed_are_refused(
         heard = capsys.readouterr().err
         assert "a run removes earlier results there" in heard or "holds no score" in heard
     assert curve.exists()
+
+
+@pytest.mark.parametrize("below", [".", "out"])
+def test_no_result_lies_among_the_slices_of_a_scan(tmp_path: Path, below: str) -> None:
+    """All that lies in a DICOM frame's folder is read as the scan: it had changed after every run."""
+    frame = tmp_path / "frames" / "000"
+    frame.mkdir(parents=True)
+    with pytest.raises(UsageError, match="are read as a scan; name a folder outside of it"):
+        guard_apart(frame / below, [tmp_path / "reference.mha", frame])
+    guard_apart(tmp_path / "frames" / "out", [tmp_path / "reference.mha", frame])
 
 
 def test_a_gate_closes_on_the_limit_s_far_side_and_on_nothing_to_go_by() -> None:
@@ -707,6 +719,41 @@ def test_an_output_that_cannot_be_written_is_no_success() -> None:
     assert done.stderr.strip().splitlines() == [
         "the output cannot be written: No space left on device; make room, then give the command again"
     ]
+
+
+@pytest.mark.parametrize(
+    ("said", "told"),
+    [
+        ("cannot cache function 'x': no locator available for file 'y'", "set NUMBA_CACHE_DIR"),
+        ("Could not determine home directory.", "set HOME"),
+    ],
+)
+def test_a_user_without_a_home_is_told_what_to_set(
+    said: str, told: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Containers run as a number that no file knows: a traceback from numba or pathlib."""
+
+    def homeless(_args: object) -> int:
+        raise RuntimeError(said)
+
+    monkeypatch.setattr("pipeline.cli.carried_out", homeless)
+    assert main(["cache", "--info"]) == 2
+    assert told in capsys.readouterr().err
+    monkeypatch.setattr("pipeline.cli.NOWHERE", {})
+    with pytest.raises(RuntimeError):
+        main(["cache", "--info"])
+
+
+def test_a_terminal_that_knows_no_umlaut_gets_it_spelt_out(tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "pipeline", "check", str(tmp_path / "Gefäß")],
+        env=os.environ | {"PYTHONIOENCODING": "ascii:strict"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 2
+    assert r"Gef\xe4\xdf" in done.stderr
 
 
 def test_a_closed_output_is_no_trouble() -> None:

@@ -556,7 +556,15 @@ def changing(monkeypatch: pytest.MonkeyPatch, stage: str, change: Callable[[], o
     monkeypatch.setitem(STEPS, stage, changed)
 
 
-@pytest.mark.parametrize(("stage", "how"), [("trace", "written to"), ("compare", "replaced"), ("trace", "its folder")])
+@pytest.mark.parametrize(
+    ("stage", "how"),
+    [
+        ("trace", "written to"),
+        ("trace", "written to, its time put back"),
+        ("compare", "replaced"),
+        ("trace", "its folder"),
+    ],
+)
 def test_a_scan_that_is_replaced_while_it_is_read_fails_its_case(
     study: Path, whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, stage: str, how: str
 ) -> None:
@@ -566,8 +574,11 @@ def test_a_scan_that_is_replaced_while_it_is_read_fails_its_case(
     was = scan.read_bytes()
 
     def replace() -> None:
-        if how == "written to":
+        if how.startswith("written to"):
+            stat = scan.stat()
             scan.write_bytes(other.read_bytes())
+            if how.endswith("put back"):  # as by `rsync --inplace --times`
+                os.utime(scan, ns=(stat.st_atime_ns, stat.st_mtime_ns))
         elif how == "replaced":
             shutil.copy2(other, own / "new.mha")
             os.utime(own / "new.mha", ns=(0, scan.stat().st_mtime_ns))

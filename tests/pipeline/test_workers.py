@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -55,6 +56,36 @@ def resident_of_a_worker() -> float:
 
 def own_memory(_: int) -> float:
     return workers.resident_mib(os.getpid())
+
+
+def test_time_in_which_everything_was_suspended_does_not_count(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A job that its queue holds for a night had "taken longer than --case-timeout"."""
+    clock = iter([0.0, 0.1, 40000.0, 40000.1, 40000.2])
+    monkeypatch.setattr(workers, "time", SimpleNamespace(monotonic=lambda: next(clock, 40000.2)))
+    (found,) = run_all([0.3], time.sleep, limits=Limits(seconds=5.0))
+    assert found.status == "ok"
+
+
+@pytest.mark.parametrize("name", ["signal", "pipeline"])
+def test_nothing_is_imported_from_the_working_folder(tmp_path: Path, name: str) -> None:
+    """Where `wireval` is started, a user's own package pipeline may lie: every case was lost to a dead worker."""
+    (tmp_path / f"{name}.py").write_text("raise SystemExit('not mine')", encoding="utf-8")
+    words = "import os, sys; os.chdir(sys.argv[1]); from pipeline.run.workers import in_processes; "
+    words += "print([o.result for o in in_processes([7], abs, 1)])"
+    done = subprocess.run(
+        [sys.executable, "-P", "-c", words, str(tmp_path)], env=with_root(), capture_output=True, text=True, check=False
+    )
+    assert (done.stdout, done.stderr) == ("[7]\n", "")
+
+
+def test_a_folder_for_temporary_files_may_have_a_long_path(tmp_path: Path) -> None:
+    """A socket's path has 107 bytes at most: `-j 2` ended in a traceback."""
+    place = tmp_path / ("a" * 60) / ("b" * 60)
+    place.mkdir(parents=True)
+    words = "from pipeline.run.workers import in_processes; print([o.result for o in in_processes([7], abs, 1)])"
+    env = with_root() | {"TMPDIR": str(place)}
+    done = subprocess.run([sys.executable, "-c", words], env=env, capture_output=True, text=True, check=False)
+    assert (done.stdout, done.stderr) == ("[7]\n", "")
 
 
 def test_the_signal_that_ended_a_worker_is_told() -> None:
