@@ -6,7 +6,7 @@ the trace's and the segments' make u_val; an error within 2 u_val says nothing o
 
 from pipeline.budget.ensemble import Scene, replayed
 from pipeline.budget.frame import Budget, FrameSample, frame_budget
-from pipeline.budget.inputs import SOURCES, Nominal, Sigmas, alone, drawn, sigmas_of
+from pipeline.budget.inputs import SOURCES, Nominal, Sigmas, alone, drawn, exact, sigmas_of
 from pipeline.budget.joint import coefficients, rank_of_ends
 from pipeline.budget.shapes import releases
 
@@ -20,6 +20,7 @@ __all__ = [
     "alone",
     "coefficients",
     "drawn",
+    "exact",
     "frame_budget",
     "rank_of_ends",
     "releases",

@@ -170,5 +170,10 @@ def _moved(clamp: Clamp, covariance: Array, rng: np.random.Generator) -> tuple[C
 
 def alone(sigmas: Sigmas, source: str) -> Sigmas:
     """The standard deviations with all inputs but one exact; draws of that one stay the same."""
-    exact: dict[str, Any] = {name: 0.0 * getattr(sigmas, name) for name in SOURCES if name != source}
-    return replace(sigmas, **exact)
+    return replace(exact(sigmas), **{source: getattr(sigmas, source)})
+
+
+def exact(sigmas: Sigmas) -> Sigmas:
+    """The standard deviations with all inputs exact."""
+    none: dict[str, Any] = {name: 0.0 * getattr(sigmas, name) for name in SOURCES}
+    return replace(sigmas, **none)

@@ -19,6 +19,7 @@ from pipeline.budget import (
     alone,
     coefficients,
     drawn,
+    exact,
     frame_budget,
     joint,
     rank_of_ends,
@@ -97,17 +98,18 @@ def test_the_spread_rests_on_many_lumens(members: int, lumens: int) -> None:
     assert len({m.lumen for m in found}) == lumens
 
 
+def tube(radius: float) -> Lumen:
+    """Along z."""
+    axes = [np.arange(a, b, 0.4) for a, b in ((-4.0, 4.0), (-4.0, 4.0), (-3.0, 24.0))]
+    x, y, _ = np.meshgrid(*axes, indexing="ij")
+    distance = (np.hypot(x, y) - radius).astype(np.float32)
+    grid = Grid(distance, np.full(3, 0.4), np.array([-4.0, -4.0, -3.0]))
+    return Lumen(grid, grid.with_values((distance < 0).astype(np.uint8)))
+
+
 @pytest.mark.parametrize("bias_mm", [-0.1, -0.6, 0.3])
 def test_a_lumen_may_be_wider_by_more_than_the_wire_is_thick(bias_mm: float) -> None:
     """It was simulated as 0.18 mm wider, the radius of the wire: u at the tip was a fifth to a third too small."""
-    axes = [np.arange(a, b, 0.4) for a, b in ((-4.0, 4.0), (-4.0, 4.0), (-3.0, 24.0))]
-    x, y, _ = np.meshgrid(*axes, indexing="ij")
-
-    def tube(radius: float) -> Lumen:
-        distance = (np.hypot(x, y) - radius).astype(np.float32)
-        grid = Grid(distance, np.full(3, 0.4), np.array([-4.0, -4.0, -3.0]))
-        return Lumen(grid, grid.with_values((distance < 0).astype(np.uint8)))
-
     clamp = Clamp(np.zeros(3), np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0]))
     arc, way = np.linspace(0.0, 20.0, 41), Way.reading([Stop(0, 20.0)])
     found = []
@@ -117,6 +119,33 @@ def test_a_lumen_may_be_wider_by_more_than_the_wire_is_thick(bias_mm: float) -> 
         found.append(replayed(scene, [[member]], [arc])[0][0][0])
     assert abs(found[1][-1, 0]) > 0.4
     np.testing.assert_allclose(*found, rtol=0.0, atol=2e-3)  # the single precision of the distances
+
+
+@pytest.mark.parametrize(("segment_mm", "long_enough"), [(1.0, True), (4.0, False)])
+def test_members_have_the_segments_of_the_simulated_wire_where_longer_ones_lie_elsewhere(
+    segment_mm: float, long_enough: bool
+) -> None:
+    """With all inputs exact u was 1.9 mm: members of 1 mm snapped aside where the wire of 0.125 mm did not.
+
+    And what long segments are off is no uncertainty of an input.
+    """
+    lumen, curved = tube(1.2), replace(WIRE, bending_stiffness_N_mm2=[(0.0, 0.3), (2.0, 5.0)])
+    arc, way = np.linspace(0.0, 20.0, 41), Way.reading([Stop(0, 20.0)])
+    fine = Scene(curved, Wall(2.0, 0.0), lumen, SolverConfig(segment_mm=0.25), [ALONG_Z[:41]], way)
+    clamp = Clamp(np.zeros(3), np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0]))
+    work = object.__new__(Work)
+    work.scene, work.nominal = fine, Nominal(clamp, np.array([20.0]), np.zeros(1), SimulateConfig(), np.zeros(1, bool))
+    work.sigmas = exact(sigmas_of({}, work.nominal, curved, np.zeros(1), 0.4))
+    work.run = cast(Any, SimpleNamespace(config=SimpleNamespace(budget=SimpleNamespace(seed=0))))
+    (member,) = drawn(work.nominal, work.sigmas, 1, 1)
+    work.seen = [FrameSample(arc, replayed(fine, [[member]], [arc])[0][0][0])]
+    quick = replace(fine, solver=replace(fine.solver, segment_mm=segment_mm))
+    work._settle(quick)
+    assert (work.scene.solver.segment_mm == segment_mm) == long_enough
+    ((wires,),) = work.ensembles([(work.sigmas, 3)])
+    np.testing.assert_allclose(wires, np.broadcast_to(work.seen[0].nominal_mm, wires.shape), rtol=0.0, atol=1e-9)
+    apart = replayed(quick, [[member]], [arc])[0][0][0] - work.seen[0].nominal_mm
+    assert np.abs(apart).max() > 0.003, "mm"
 
 
 def test_a_noisy_scan_has_a_lumen_that_is_less_known() -> None:

@@ -18,6 +18,7 @@ from pipeline.budget import (
     alone,
     coefficients,
     drawn,
+    exact,
     frame_budget,
     rank_of_ends,
     releases,
@@ -34,7 +35,7 @@ from pipeline.run.stages.way import by_trace, way_of
 from pipeline.simulate import altered
 from pipeline.simulate.clamp import TIP_VOXELS, ahead_of
 from pipeline.simulate.evidence import UNKNOWN_VOXELS, TraceSamples
-from pipeline.simulate.resolution import lengths_mm
+from pipeline.simulate.resolution import AGREED_MM, lengths_mm
 from pipeline.simulate.way import Way
 
 AT_REST, RARE = 0.9, 0.05
@@ -144,12 +145,27 @@ class Work:
         self.seen = [self._seen(frame) for frame in frames]
         wires = [frame.simulated.joints_mm for frame in stops if frame.simulated is not None]
         traces = [frame.curve.points_mm for frame in frames if frame.curve is not None and frame.traced]
-        # the longest segments will do: their error is common to all members, and num_mm has it
+        as_simulated = replace(config.solver, segment_mm=known.segment_mm)
+        shared = case.wire, case.wall, known.vessel, as_simulated, [*wires, *traces]
+        self.scene = Scene(*shared, self.way, case.catheter, config.budget.seed)
         lengths = lengths_mm(config.solver.segment_mm, altered(case.wire, config.simulate).rest_curvature_per_mm)
         segment = lengths[0] if config.solver.segment_mm == "auto" else known.segment_mm
-        solver = replace(config.solver, segment_mm=segment, finest_mm=config.solver.step_mm)
-        shared = case.wire, case.wall, known.vessel, solver, [*wires, *traces]
-        self.scene = Scene(*shared, self.way, case.catheter, config.budget.seed)
+        quick = replace(as_simulated, segment_mm=segment, finest_mm=config.solver.step_mm)
+        self._settle(replace(self.scene, solver=quick))
+
+    def _settle(self, quick: Scene) -> None:
+        """Long segments and no repeated steps, for all members, if with these the simulated wire is where it is.
+
+        What is left between the two is common to all members, and num_mm has it: it is taken off each of them.
+        Where the wire snaps aside with long segments, so would members, and u would be the distance between two shapes.
+        """
+        (member,) = drawn(self.nominal, exact(self.sigmas), 1, 1)
+        ((*found,),) = replayed(quick, [[member]], [seen.arc_mm for seen in self.seen])
+        self.aside = [seen.nominal_mm - wires[0] for seen, wires in zip(self.seen, found, strict=True)]
+        if all(rms(np.linalg.norm(away, axis=1)) <= AGREED_MM for away in self.aside):
+            self.scene = quick
+        else:
+            self.aside = [np.zeros_like(away) for away in self.aside]
 
     def _depth_sigmas(self, stops: Sequence[Frame]) -> Array:
         """Standard deviation (stops,) of the depth of each frame on the way, mm."""
@@ -223,7 +239,8 @@ class Work:
         """The wires (members, n, 3) of each frame, for each ensemble: its standard deviations and number of members."""
         seed = self.run.config.budget.seed
         members = [drawn(self.nominal, sigmas, count, members_per_lumen(count), seed) for sigmas, count in draws]
-        return replayed(self.scene, members, [seen.arc_mm for seen in self.seen])
+        found = replayed(self.scene, members, [seen.arc_mm for seen in self.seen])
+        return [[wires + aside for wires, aside in zip(each, self.aside, strict=True)] for each in found]
 
     def by_source(
         self, found: Mapping[int, Budget | None], each: Mapping[str, Sequence[Array]]
