@@ -5,6 +5,7 @@ hand-picked entry is no better. The wire's first millimetres show the clamp, ben
 the solver's wire, with its stiffness, rest curvature and wall, is what is fitted. The manifest's statement is the
 prior, with the uncertainty that it states. The unknowns are the clamp's place (3), two tilts of its direction and an
 offset of each frame's depth; Gauss-Newton finds them, with difference quotients from clamps that are a little off.
+Long segments do for that, unless they are seen to lay the wire elsewhere where the steps end.
 
 Along the wire the clamp stays in the manifest's plane. A straight wire that slides along itself is the same wire, so
 that nothing but what the model gets wrong farther on would tell this place, and all depths would follow it: a wire that
@@ -39,6 +40,9 @@ TIP_VOXELS = 0.25
 near the entry: 0.3 mm deeper turns such a wire by 2.6 degrees."""
 TANGENT_MM = 0.25
 ALONG = 0  # of the unknowns: the place along the entry direction, which is held
+COARSE_MM = 0.005
+"""Segments may be off by so much, root mean square over the points that are fitted: a third of what noise leaves of the
+place. Those of 1 mm turned a clamp 2 mm before a bend of 4 mm radius by 2 degrees."""
 SNAPS = 3.0
 """A derivative of more than this many times a rigid wire's is a snap: that frame is not used in this round."""
 
@@ -111,6 +115,10 @@ def _feet(trace: TraceSamples, curve: Array) -> tuple[Array, Array]:
     return foot, tangent
 
 
+def _at_rest(*wires: Solution) -> bool:
+    return all(wire.converged and len(wire.joints_mm) > 1 for wire in wires)
+
+
 def _linear(wires: Sequence[Solution], trace: TraceSamples, steps: Array) -> tuple[Array, Array, bool]:
     """Residuals (n, 3) of a trace across the wire, their derivatives (n, 3, 6), and whether the frame can be used.
 
@@ -118,7 +126,7 @@ def _linear(wires: Sequence[Solution], trace: TraceSamples, steps: Array) -> tup
     the last of them.
     """
     n = len(trace.points_mm)
-    if n == 0 or not all(wire.converged and len(wire.joints_mm) > 1 for wire in wires):
+    if n == 0 or not _at_rest(*wires):
         return np.zeros((n, 3)), np.zeros((n, 3, len(steps))), False
     curves = [wire.joints_mm for wire in wires]
     foot, tangent = _feet(trace, curves[0])
@@ -157,6 +165,25 @@ class _Fit:
     sigmas: Array
     replay: Replay
     voxel_mm: float
+
+    def ended(self, at: Array) -> tuple[Array, _Round]:
+        """The values (5 + frames,) at which the steps from others come to an end, and the last of these."""
+        for number in range(ROUNDS):
+            last = self.round(at)
+            step = (last.goal - at) * (1.0 if number < WHOLE_STEPS else 0.5)
+            at = at + step
+            if np.all(np.abs(step) <= SETTLED * np.sqrt(np.diag(last.covariance))):
+                break
+        return at, last
+
+    def too_coarse(self, at: Array, shorter: Replay) -> bool:
+        """Whether wires of shorter segments lie elsewhere where they are fitted, at values (5 + frames,)."""
+        clamp = moved(self.given, at[:5])
+        depths = [max(depth_from(clamp, f.curve) + d, 0.1) for f, d in zip(self.seen, at[5:], strict=True)]
+        long, short = (replay([clamp], self.seen, [depths])[0] for replay in (self.replay, shorter))
+        pairs = [(a, b, t.arc_mm) for a, b, t in zip(long, short, self.traces, strict=True) if _at_rest(a, b)]
+        apart = [at_arc(a.joints_mm, arc) - at_arc(b.joints_mm, arc) for a, b, arc in pairs if len(arc)]
+        return any(np.sqrt(np.mean(np.sum(off**2, axis=1))) > COARSE_MM for off in apart)
 
     def look(self, at: Array) -> _Seen:
         """Residuals and derivatives of each frame at values (5 + frames,), and which frames can be used."""
@@ -205,10 +232,13 @@ class _Fit:
             out.append(use[worst])
 
 
-def estimated_clamp(seen: Sequence[TracedFrame], given: Clamp, prior: Prior, replay: Replay, voxel_mm: float) -> Clamp:
+def estimated_clamp(
+    seen: Sequence[TracedFrame], given: Clamp, prior: Prior, replays: tuple[Replay, Replay], voxel_mm: float
+) -> Clamp:
     """The clamp from the traces and what the manifest says of it; the manifest's where they are too far apart.
 
-    seen : frames whose traces are to be trusted, in the order of the insertion.     voxel_mm : of the scans.
+    seen : frames whose traces are to be trusted, in the order of the insertion.     replays : with long segments, and
+    with shorter ones.     voxel_mm : of the scans.
     """
     deepest = sorted(f.curve.length_mm for f in seen)[:MOST_FRAMES][-1:]
     chosen = [f for f in seen if f.curve.length_mm <= deepest[0]] if deepest else []
@@ -217,14 +247,10 @@ def estimated_clamp(seen: Sequence[TracedFrame], given: Clamp, prior: Prior, rep
         return given
     tips = [np.nan_to_num(f.curve.tip_sigma_mm) for f in chosen]
     sigmas = np.concatenate([prior.sigmas, np.hypot(tips, TIP_VOXELS * voxel_mm)])
-    fit = _Fit(chosen, samples_of(chosen), given, sigmas, replay, voxel_mm)
-    at = np.zeros(len(sigmas))
-    for number in range(ROUNDS):
-        last = fit.round(at)
-        step = (last.goal - at) * (1.0 if number < WHOLE_STEPS else 0.5)
-        at = at + step
-        if np.all(np.abs(step) <= SETTLED * np.sqrt(np.diag(last.covariance))):
-            break
+    fit = _Fit(chosen, samples_of(chosen), given, sigmas, replays[0], voxel_mm)
+    at, last = fit.ended(np.zeros(len(sigmas)))
+    if fit.too_coarse(at, replays[1]):
+        at, last = replace(fit, replay=replays[1]).ended(at)
     found = moved(given, at[:5])
     found = replace(found, covariance=_in_space(given, last.covariance[:5, :5]))
     contradiction = departed(given, found, prior.sigma_mm, prior.direction_sigma_deg)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -51,16 +53,18 @@ def trace(depth_mm: float, noise_mm: float, rng: np.random.Generator) -> Curve:
 
 
 def replay(
-    clamps: Sequence[Clamp], seen: Sequence[TracedFrame], depths: Sequence[Sequence[float]]
+    clamps: Sequence[Clamp], seen: Sequence[TracedFrame], depths: Sequence[Sequence[float]], wire: GuideWire = WIRE
 ) -> list[list[Solution]]:
     """The solver's free wire from each clamp."""
-    wires = [Insertion(WIRE, None, c.entry_mm, c.direction, material_axis=c.material_axis) for c in clamps]
+    wires = [Insertion(wire, None, c.entry_mm, c.direction, material_axis=c.material_axis) for c in clamps]
     ways = [Way.reading(map(Stop, [f.index for f in seen], way, [f.roll_deg for f in seen])) for way in depths]
     return together(wires, ways)
 
 
 def estimate(curves: Sequence[Curve], given: Clamp, prior: Prior = PRIOR) -> Clamp:
-    return estimated_clamp([TracedFrame(i, curve) for i, curve in enumerate(curves)], given, prior, replay, VOXEL_MM)
+    return estimated_clamp(
+        [TracedFrame(i, curve) for i, curve in enumerate(curves)], given, prior, (replay, replay), VOXEL_MM
+    )
 
 
 def off(tilt_deg: float, at_mm: Sequence[float] = (0.1, 0.1, 0.0)) -> Clamp:
@@ -84,6 +88,17 @@ def test_where_the_curved_tip_is_all_that_is_seen_it_corrects_and_knows_what_it_
     # an arc slid along itself is the same arc: the prior's 0.15 mm along it are 1.3 degrees
     assert error_deg(found) < 1.3
     assert error_deg(found) < 2 * found.sigma_deg
+
+
+def test_long_segments_that_lay_the_wire_elsewhere_turn_no_clamp() -> None:
+    """Before a bend of 4 mm radius those of 1 mm turned it by 2 degrees, three of its standard deviations."""
+    coarse = partial(replay, wire=replace(WIRE, segment_mm=4.0))
+    seen = [TracedFrame(i, trace(9.0 + i, 1e-4, np.random.default_rng(0))) for i in range(3)]
+    long, both = (
+        estimated_clamp(seen, off(2.0), PRIOR, replays, VOXEL_MM) for replays in ((coarse, coarse), (coarse, replay))
+    )
+    assert error_deg(long) > 0.5
+    assert error_deg(both) < 0.1
 
 
 def test_it_is_as_far_off_as_it_says() -> None:
@@ -209,7 +224,7 @@ def test_an_exact_entry_beside_the_traced_wires_is_told(
     monkeypatch: pytest.MonkeyPatch, entry: str, aside_mm: float, sigma_mm: float, doubted: bool
 ) -> None:
     """1.6 mm beside them, said to be exact, or known to a nanometre: every frame was ok without a word."""
-    monkeypatch.setattr("pipeline.run.stages.clamp._replayed", lambda _run, _known, *args: replay(*args))
+    monkeypatch.setattr("pipeline.run.stages.clamp._replayed", lambda _run, _known, *args, **_: replay(*args))
     curves = [trace(12.0 + 4 * i, 0.02, np.random.default_rng(i)) for i in range(3)]
     run, known = known_of([Curve(c.points_mm + [aside_mm, 0.0, 0.0], c.sigma_mm, 0.01) for c in curves])
     run.case.entry_sigma_mm = sigma_mm

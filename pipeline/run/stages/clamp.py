@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -24,6 +25,9 @@ from pipeline.simulate.way import Stop, Way
 from pipeline.study.manifest import Case
 from solver import Solution
 
+SHORT_MM = 0.125
+"""Segments short enough for a wire's first 10 mm, whatever it does farther on."""
+
 
 def clamp_of(run: Context, known: Known) -> Clamp:
     """The clamp of the simulation: estimated from the scans, or the manifest's."""
@@ -35,7 +39,8 @@ def clamp_of(run: Context, known: Known) -> Clamp:
         return given
     if run.case.entry_case is not None:
         return _of_another(run, run.case.entry_case, given, known.frames)
-    clamp = estimated_clamp(seen, given, prior, lambda *args: _replayed(run, known, *args), voxel_mm)
+    replays = partial(_replayed, run, known), partial(_replayed, run, known, most_mm=SHORT_MM)
+    clamp = estimated_clamp(seen, given, prior, replays, voxel_mm)
     # stated better than traces show it, an entry hardly moves, which is no departure from what is stated
     if prior.sigma_mm < UNKNOWN_VOXELS * voxel_mm and not departed(given, clamp, prior.sigma_mm, 0.0):
         clamp = replace(clamp, warning="; ".join(filter(None, (clamp.warning, passed))))
@@ -64,13 +69,18 @@ def _of_another(run: Context, other: Case, given: Clamp, own: Sequence[Frame]) -
 
 
 def _replayed(
-    run: Context, known: Known, clamps: Sequence[Clamp], seen: Sequence[TracedFrame], depths: Sequence[Sequence[float]]
+    run: Context,
+    known: Known,
+    clamps: Sequence[Clamp],
+    seen: Sequence[TracedFrame],
+    depths: Sequence[Sequence[float]],
+    most_mm: float = np.inf,
 ) -> list[list[Solution]]:
-    """The wire of every frame from several clamps, with the longest segments."""
+    """The wire of every frame from several clamps, with the longest segments, of ``most_mm`` at most."""
     case, config, lumen = run.case, run.config, known.lumen
     assert lumen is not None
-    segment = lengths_mm(config.solver.segment_mm, altered(case.wire, config.simulate).rest_curvature_per_mm)[0]
-    settings = replace(config.solver, segment_mm=segment, finest_mm=config.solver.step_mm)
+    longest = lengths_mm(config.solver.segment_mm, altered(case.wire, config.simulate).rest_curvature_per_mm)[0]
+    settings = replace(config.solver, segment_mm=min(longest, most_mm), finest_mm=config.solver.step_mm)
     insertions = [
         insertion_of(case.wire, case.wall, lumen, clamp, settings, config.simulate, case.catheter) for clamp in clamps
     ]
