@@ -62,7 +62,7 @@ def frame_budget(wires: Array, seen: FrameSample) -> Budget | None:
     arc, nominal, curve, foot, own, ahead_mm = seen
     real = None if curve is None else at_arc(curve, arc - ahead_mm)
     shapes = shapes_of(wires, nominal, real, arc)
-    near = wires if shapes is None or shapes.with_simulated.sum() < FEWEST else wires[shapes.with_simulated]
+    near = wires if shapes is None else wires[shapes.with_simulated]  # of fewer than four no u is known
     away = near - nominal
     moment = np.einsum("mni,mnj->nij", away, away) / len(near)
     axes = axes_across(nominal, arc) if curve is None or foot is None else axes_across(curve, foot)

@@ -3,6 +3,7 @@
 import functools
 import os
 import shutil
+import traceback
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,7 +27,7 @@ from pipeline.run.view import LumenFiles, write_view
 from pipeline.study.manifest import Case
 from pipeline.study.settings import Resolved
 from reports import tables
-from reports.atomic import writing
+from reports.atomic import WriteError, writing
 from reports.case_page import render_case
 from reports.page import Each, compiled
 from reports.schema import BUDGET, ENTRIES, ERRORS, POINTS, TIMINGS
@@ -161,7 +162,7 @@ def _compute(job: Job, hashed: Callable[[], None], inputs: Inputs, progress: Cas
     finally:
         files.end()
     if job.wants_pages:
-        draw(job.folder, job.wants_pages, job.cores)
+        _draw(job, progress)
     progress.write(f"done in {perf_counter() - clock:.2f} s")
 
 
@@ -173,7 +174,7 @@ def _heal(job: Job, progress: CaseProgress) -> None:
     if known.pages != job.wants_pages and (job.embed or not known.pages):
         wrong = "they are of another kind" if known.pages else "the run before ended first"
     if job.wants_pages and wrong:
-        draw(job.folder, job.wants_pages, job.cores)
+        _draw(job, progress)
         progress("compare", 1, 1, f"unchanged since the last run, kept; its pages were drawn again: {wrong}")
     else:
         progress("compare", 1, 1, "unchanged since the last run, kept")
@@ -182,6 +183,20 @@ def _heal(job: Job, progress: CaseProgress) -> None:
 def each_on(cores: int) -> Each:
     """A function ``(work, count)`` that shares ``count`` calls of ``work`` among cores; pages draw figures with it."""
     return lambda work, count: shared(lambda number, _: work(number), count, cores, compiled)
+
+
+def _draw(job: Job, progress: CaseProgress) -> None:
+    """Draw the pages of a case; a fault in one of them costs the pages, not what was computed."""
+    try:
+        draw(job.folder, job.wants_pages, job.cores)
+    except WriteError:
+        raise
+    except Exception as error:
+        progress.write(traceback.format_exc())
+        progress.warn(
+            f"its pages cannot be drawn ({type(error).__name__}: {error}); its results stand, and `wireval report` "
+            f"tries again; please report this, with {job.folder / 'log.txt'}"
+        )
 
 
 def draw(folder: Path, pages: ledger.Pages, cores: int = 1) -> None:

@@ -38,6 +38,7 @@ def _too_coarse(case: Case, config: Config, calibrates: bool) -> str:
     what += "a segment turns by a right angle at most"
     if config.solver.segment_mm == "auto":
         most = math.pi / 2 / (length * room)
-        return f"{what}; give the wire {most:.3g} per mm or less, or lower simulate.rest_curvature_scale"
+        keys = "uncertainty.rest_curvature" if spread > 1.0 else "simulate.rest_curvature_scale"
+        return f"{what}; give the wire {most:.3g} per mm or less, or lower {keys}"
     most = math.floor(50 * math.pi / (curvature * room)) / 100
     return f"solver.segment_mm = {length:g}: {what}; allowed: up to {most:g} mm for this wire, or auto"

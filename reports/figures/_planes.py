@@ -104,7 +104,12 @@ class View:
             axes.plot(across[-1:], up[-1:], "o", color=look["color"], markersize=tip)
 
     def band(self, axes: Axes, points_mm: Array, covariance_mm2: Array, plane: Plane, **look: Any) -> None:
-        """Fill two standard deviations to both sides of a curve (n, 3), whose points have covariances (n, 3, 3)."""
+        """Fill two standard deviations to both sides of a curve (n, 3), whose points have covariances (n, 3, 3).
+
+        A single point has no sides.
+        """
+        if len(points_mm) < 2:
+            return
         seen, turn = list(plane[1:]), self.scan.direction[:, plane[1:]]
         centre = self.coordinates(points_mm)[:, seen]
         along = np.gradient(centre, axis=0)

@@ -23,13 +23,13 @@ def budget(case: CaseFiles) -> Drawing | None:
     Both are of our solver's wire, so that there is none beside another simulator's.
     """
     sources, entries = (read_if_there(case.folder / table.file, table) for table in (BUDGET, ENTRIES))
-    shown = [table for table in (sources, entries) if len(table)]
+    computed = sources[sources[_BARS].notna().any(axis="columns")]
+    shown = [table for table, rows in ((sources, computed), (entries, entries)) if len(rows)]
     if not shown or case.handed_in:
         return None
-    computed = sources[sources[_BARS].notna().any(axis="columns")]
     figure = new_figure(max(_REST_INCH + _ROW_INCH * max(len(computed), len(entries)), 2.6))
     panels = iter(figure.subplots(1, len(shown), squeeze=False, width_ratios=[1.5, 1.0][-len(shown) :]).ravel())
-    if len(sources):
+    if len(computed):
         _by_source(next(panels), computed)
     if len(entries):
         _by_entry(next(panels), entries)

@@ -234,6 +234,13 @@ def test_two_shapes_have_their_probabilities_and_the_real_wire_has_one() -> None
     assert np.max(budget.input_mm) < 0.3, "the spread is that within the simulated shape"
     assert budget.ratio[-1] > 2.0
     assert frame_budget(wires[:4], seen) is None
+    # seen from the rarer shape: 3.0 mm, the distance between the two, where fewer than eight members shared it
+    for count, known in ((7, True), (3, False)):
+        few = np.concatenate([wires[:count], wires[20:]])
+        budget = frame_budget(few, seen._replace(nominal_mm=gone, curve_mm=held))
+        assert budget is not None
+        assert (np.max(budget.input_mm) < 0.6) == known
+        assert np.isnan(budget.input_mm[-1]) != known
 
 
 def test_the_energy_score_is_least_for_the_right_ensemble() -> None:

@@ -343,6 +343,23 @@ def test_a_log_that_is_a_pipe_does_not_block(study: Path, whole: Path, out: Path
     assert (case_of(out) / "log.txt").is_file()
 
 
+def test_a_page_that_cannot_be_drawn_costs_no_result(
+    study: Path, whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A frame of one point had no band to draw: all frames of its case were lost as crashed."""
+
+    def faulty(*_: object) -> None:
+        raise ValueError("no band")
+
+    out = tmp_path / "out"
+    with monkeypatch.context() as patch:
+        patch.setattr("pipeline.run.case.render_case", faulty)
+        assert run(study, out) == 0
+    assert "its pages cannot be drawn (ValueError: no band); its results stand" in capsys.readouterr().err
+    assert main(["report", str(out)]) == 0
+    assert differences(whole, out) == []
+
+
 def test_report_heals_pages(study: Path, whole: Path, out: Path) -> None:
     shutil.rmtree(case_of(out) / "figures")
     (case_of(out) / "report.html").write_text("half a pa", encoding="utf-8")

@@ -264,7 +264,8 @@ class Work:
     def _alone(self, source: str, ensemble: Sequence[Array], calm: Sequence[int]) -> dict[str, Any]:
         """The row of one input by its ensemble."""
         budgets = self.budgets_of(ensemble)
-        return _row(source, self.sigmas.said[source], [b.input_mm for i in calm if (b := budgets[i]) is not None])
+        known = [b.input_mm for i in calm if (b := budgets[i]) is not None and np.isfinite(b.input_mm).all()]
+        return _row(source, self.sigmas.said[source], known)
 
 
 def _row(name: str, said: str, values: Sequence[Array]) -> dict[str, Any]:
