@@ -17,7 +17,7 @@ from pipeline.run import ledger, outputs, results
 from pipeline.run.cache import Store
 from pipeline.run.hashing import hashing
 from pipeline.run.helpers import nothing, shared
-from pipeline.run.inputs import Inputs
+from pipeline.run.inputs import Inputs, times_of
 from pipeline.run.log import CaseProgress, Log, Stage
 from pipeline.run.occupied import held
 from pipeline.run.provenance import code_state, package_version, peak_memory_mib, this_run
@@ -234,7 +234,7 @@ def _written(job: Job, known: Known, log: Log, files: LumenFiles, clock: float) 
     summary, key = write_tables()
     spent = {"total_s": perf_counter() - clock, "peak_memory_MiB": peak_memory_mib()}
     tables.write(job.folder / TIMINGS.file, TIMINGS, outputs.timing_rows(job.case.id, log, **spent))
-    results.write_json(job.folder / ledger.PROVENANCE, this_run() | {"reused": log.reused})
+    results.write_json(job.folder / ledger.PROVENANCE, this_run() | {"reused": log.reused, "files": times_of(job.case)})
     details = results.details_of(job.case, known, log) | ({"simulator": job.simulator} if job.simulator else {})
     summary |= {"warnings": len(log.warnings)}
     details |= {"until": job.until, "config": job.settings.as_dict(), "provenance": code_state()}

@@ -8,7 +8,7 @@ from typing import Any
 from pipeline.run.hashing import file_hash
 from pipeline.run.inputs import named_files, other_file, stated
 from pipeline.run.log import STAGES, Stage
-from pipeline.run.provenance import written_at
+from pipeline.run.provenance import times_in
 from pipeline.run.results import jsonable
 from pipeline.status import UsageError
 from pipeline.study.manifest import Case
@@ -90,7 +90,7 @@ def _otherwise(known: Mapping[str, Any], case: Case, settings: Resolved) -> str:
 
 
 def _other_file(known: Mapping[str, Any], case: Case, folder: Path) -> str:
-    file = other_file(case, known["inputs"], written_at(folder)) if "inputs" in known else ""
+    file = other_file(case, known["inputs"], times_in(folder)) if "inputs" in known else ""
     return f"another file: {file}" if file else ""
 
 

@@ -87,11 +87,11 @@ def contents_of(files: Sequence[Mapping[str, Any]]) -> str:
     return hashlib.sha256(repr(rows).encode()).hexdigest()[:16]
 
 
-def other_file(case: Case, known: Sequence[Mapping[str, Any]], since: float) -> str:
+def other_file(case: Case, known: Sequence[Mapping[str, Any]], times: Mapping[str, int]) -> str:
     """Which file of a case is not the one that ``known`` describes, its key and path; empty where all are.
 
-    A large file in the same place, of the same size and not changed ``since`` (seconds from 1970, when ``known`` was
-    written), is the same; any other is hashed.
+    A large file in the same place, of the same size and with the same time (``times_of``) is the same; any other is
+    hashed. No time is held against another machine's clock.
     """
     rows = {str(row.get("key")): row for row in known}
     for key, path in named_files(case).items():
@@ -99,7 +99,7 @@ def other_file(case: Case, known: Sequence[Mapping[str, Any]], since: float) -> 
             continue
         row, size = rows.get(key, {}), _size(path)
         here = row.get("path") == str(path) and row.get("bytes") == size and size > SMALL_BYTES
-        if not (here and _changed(path) < since) and row.get("sha256") != file_hash(path):
+        if not (here and _changed(path) == times.get(key)) and row.get("sha256") != file_hash(path):
             return f"{key}, now {path}"
     return ""
 
@@ -137,10 +137,15 @@ def _state(path: Path) -> State | None:
     return stat.st_size, stat.st_mtime_ns, stat.st_ctime_ns, stat.st_ino
 
 
-def _changed(path: Path) -> float:
-    """When a file, or any of a folder or behind a header, was last written or put in its place, seconds from 1970."""
+def times_of(case: Case) -> dict[str, int]:
+    """When each input file was last written or put in its place, by its key."""
+    return {key: _changed(path) for key, path in named_files(case).items() if path.exists()}
+
+
+def _changed(path: Path) -> int:
+    """When a file, or any of a folder or behind a header, was last written or put in its place, ns from 1970."""
     stats = [file.stat() for file in _with_parts(path) if file.exists()]
-    return max((max(stat.st_mtime, stat.st_ctime) for stat in stats), default=0.0)
+    return max((max(stat.st_mtime_ns, stat.st_ctime_ns) for stat in stats), default=0)
 
 
 def _size(path: Path) -> int:

@@ -81,9 +81,10 @@ def this_run() -> dict[str, Any]:
     }
 
 
-def written_at(folder: Path) -> float:
-    """When the files of a case were written, seconds from 1970; 0 where nothing tells."""
+def times_in(folder: Path) -> dict[str, int]:
+    """When the input files of a case were last written, by key, as its result knows them; empty where it does not."""
     try:
-        return datetime.fromisoformat(str(read_json(folder / ledger.PROVENANCE).get("started", ""))).timestamp()
+        times = read_json(folder / ledger.PROVENANCE).get("files")
     except ValueError:
-        return 0.0
+        return {}
+    return times if isinstance(times, dict) else {}

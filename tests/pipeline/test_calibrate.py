@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 from collections import Counter
 from dataclasses import replace
@@ -23,12 +24,12 @@ from pipeline.calibrate.unknowns import BENDING, FRICTION, REST, ROLL, TAPER, be
 from pipeline.cli import main
 from pipeline.compare.pooled import is_pooled
 from pipeline.model import Clamp, Curve, Lumen, Wall, Wire
-from pipeline.run import calibration_files
+from pipeline.run import calibration_files, inputs
 from pipeline.run.cache import Store
 from pipeline.run.calibrated import as_calibrated, data_of
 from pipeline.run.calibration import gathered, over_insertions
 from pipeline.run.calibration_files import estimates_of, flattened, misfit
-from pipeline.run.inputs import described, other_file, stated
+from pipeline.run.inputs import described, other_file, stated, times_of
 from pipeline.run.log import Log
 from pipeline.run.outputs import error_row, summary_row
 from pipeline.run.stages import Context, Known
@@ -297,7 +298,7 @@ def test_a_friction_that_was_not_seen_stays_as_the_case_states_it(study):
     assert "not seen there, as stated: friction" in case.calibrated
 
 
-def test_a_kept_case_is_asked_for_what_is_stated_behind_its_parameters_and_for_these(study):
+def test_a_kept_case_is_asked_for_what_is_stated_behind_its_parameters_and_for_these(study, monkeypatch):
     """Results of a wall, or of parameters, that had been changed since were kept beside new ones, without a word."""
     manifest = study / "manifest.toml"
     text = manifest.read_text(encoding="utf-8").replace('id = "b"', 'id = "b"\nparameters = "p.toml"')
@@ -308,10 +309,13 @@ def test_a_kept_case_is_asked_for_what_is_stated_behind_its_parameters_and_for_t
     assert stated(made) == stated(case)
     manifest.write_text(text.replace("stiffness_N_mm2 = 7.0", "stiffness_N_mm2 = 8.0"), encoding="utf-8")
     assert stated(read_manifest(manifest).cases[1]) != stated(case)
-    known = described(made)
-    assert other_file(case, known, 0.0) == ""
+    known, times = described(made), times_of(case)
+    # a large file is not read again; with the clock of a node an hour ahead, one that was replaced was not either
+    monkeypatch.setattr(inputs, "SMALL_BYTES", 0)
+    assert other_file(case, known, times) == other_file(case, known, {}) == ""
     (study / "p.toml").write_text((study / "p.toml").read_text().replace("0.03", "0.04"), encoding="utf-8")
-    assert other_file(case, known, 0.0) == f"parameters, now {study / 'p.toml'}"
+    os.utime(study / "p.toml", ns=(0, times["parameters"]))
+    assert other_file(case, known, times) == other_file(case, known, {}) == f"parameters, now {study / 'p.toml'}"
 
 
 def test_cases_of_different_friction_are_not_calibrated_together(study, capsys):
