@@ -145,8 +145,13 @@ def carried_out(args: argparse.Namespace) -> int:
             if isinstance(path, Path):
                 status_of(path)  # a name that cannot be one is refused here, whatever it was to be
     problems = remove_summaries(args)
-    places = ((getattr(args, name, None), option) for name, option in (("out", "-o"), ("junit", "--junit")))
-    problems += [text for place, option in places if place is not None for text in unwritable(Path(place), option)]
+    out, junit = getattr(args, "out", None), getattr(args, "junit", None)
+    if out is not None:
+        problems += unwritable(Path(out), "OUT" if args.command == "report" else "-o", folder=True)
+    if junit is not None:
+        problems += unwritable(Path(junit), "--junit")
+        if out is not None and Path(junit).absolute() == Path(out).absolute():
+            problems.append(f"--junit {junit}: this is the folder of the results; name a file")
     if problems:
         raise _usage(problems[0])
     return int(importlib.import_module(f"pipeline.commands.{args.command}").main(args))

@@ -77,7 +77,18 @@ def why_not_pooled(*outs: Path) -> str:
     state them otherwise; empty where neither is so.
     """
     found = {out: results_in(out) for out in outs}
-    return _of_other_settings(found) or _of_other_manifests(found)
+    arrays = (_of_other_arrays(out) for out in outs)
+    return _of_other_settings(found) or _of_other_manifests(found) or next(filter(None, arrays), "")
+
+
+def _of_other_arrays(out: Path) -> str:
+    """The sentence on shards of several arrays that were merged: a case may be what an earlier one made of it."""
+    counts = {path.stem.rpartition("-")[2] for path in out.glob("run.*-*.json")}
+    if len(counts) < 2:
+        return ""
+    sizes = " and of ".join(sorted(counts, key=int))
+    what = f"Nothing is pooled: shards of arrays of {sizes} were merged, and a case may be of the earlier one"
+    return f"{what}; merge the folders of one array, into an empty one."
 
 
 def _of_other_settings(found: Mapping[Path, Mapping[str, Mapping[str, Any]]]) -> str:
@@ -170,7 +181,7 @@ def _cases(found: Iterable[str]) -> Told:
     return {"cases": ", ".join(sorted(found))}
 
 
-STATED, AT_CHOICE = ("wire", "wall", "entry"), ("down", "catheter")
+STATED, AT_CHOICE = ("wire", "wall", "entry"), ("role", "group", "down", "catheter")
 """Parts of result.json that say what the manifest states of a case, with calibrated parameters where there are any; and
 those that are left out where it states none."""
 FOUND = "used_", "sigma_", "covariance"

@@ -75,21 +75,21 @@ def complain(problems: Sequence[str], what: str, then: str = "; nothing was run"
     return 2
 
 
-def unwritable(place: Path, option: str) -> list[str]:
-    """Why nothing can be written at a place (a folder, or a file to be); empty where something can.
+def unwritable(place: Path, option: str, *, folder: bool = False) -> list[str]:
+    """Why nothing can be written at a place, a folder or a file to be; empty where something can.
 
     Tried with a folder that goes again, in the nearest one that exists: permissions alone do not tell.
     """
     try:
         loose = next((one for one in (place, *place.absolute().parents) if one.is_symlink() and not one.exists()), None)
-        if option == "-o" and loose is not None:
+        if folder and loose is not None:
             return [f"{option} {place}: {loose} is a link to nothing ({loose.readlink()}); remove it, or name a folder"]
-        if option == "-o" and place.exists() and not place.is_dir():
+        if folder and place.exists() and not place.is_dir():
             return [f"{option} {place}: this is a file; name a folder"]
-        if option != "-o" and place.is_dir():
+        if not folder and place.is_dir():
             return [f"{option} {place}: this is a folder; name a file"]
         nearest = next(one for one in (place, *place.absolute().parents) if one.exists())
-        if option != "-o" and nearest == place:
+        if not folder and nearest == place:
             nearest = place.parent
         with tempfile.TemporaryDirectory(prefix=".tmp-", dir=nearest):
             return []

@@ -159,6 +159,7 @@ def launch(plan: Plan) -> tuple[Totals, Path]:
     info |= {"to_score": {case.id: case.frames_to_score for case in plan.manifest.cases if case.frames_to_score}}
     info |= {"fail_if": [gate.text for gate in plan.gates]}
     name = f"run.{plan.shard.replace('/', '-')}.json" if plan.shard else "run.json"
+    _remove_arrays(out, name)
     info |= {"left_out": _never_asked(out / name, plan.left_out), "config": settings.as_dict()}
     try:
         write_json(out / name, info | {"cases": []})
@@ -202,6 +203,17 @@ def _never_asked(info: Path, left_out: Sequence[str]) -> list[str]:
         before = read_json(info)
     asked = set(before.get("planned") or ()) - set(before.get("left_out") or ())
     return [name for name in left_out if name not in asked]
+
+
+def _remove_arrays(out: Path, name: str) -> None:
+    """Remove what shards of arrays of another size say of themselves: their cases are computed anew, or kept, by this.
+
+    name : of this run's record.
+    """
+    size = name.rpartition("-")[2]
+    for path in out.glob("run.*-*.json") if "-" in name else ():
+        if not path.name.endswith(f"-{size}"):
+            path.unlink()
 
 
 def _remove_records(out: Path, manifest: str) -> None:

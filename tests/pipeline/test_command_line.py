@@ -136,12 +136,12 @@ def test_what_is_wrong_is_said(
 def test_a_place_is_tried_without_leaving_anything(tmp_path: Path) -> None:
     from pipeline.commands import unwritable
 
-    assert unwritable(tmp_path / "a" / "b", "-o") == []
+    assert unwritable(tmp_path / "a" / "b", "-o", folder=True) == []
     assert unwritable(tmp_path / "a" / "b.xml", "--junit") == []
     (tmp_path / "there.xml").write_text("before", encoding="utf-8")
     assert unwritable(tmp_path / "there.xml", "--junit") == []
     assert [path.name for path in tmp_path.iterdir()] == ["there.xml"]
-    assert unwritable(Path("x" * 300), "-o")
+    assert unwritable(Path("x" * 300), "-o", folder=True)
 
 
 def test_an_output_that_is_a_link_to_nothing_is_called_so(
@@ -470,6 +470,9 @@ def test_what_is_no_summary_is_not_replaced_by_one(
         assert said in capsys.readouterr().err
     assert scan.read_bytes() == b"ObjectType = Image\n"
     assert pipe.is_fifo()
+    if name == "junit":
+        assert main([*words, "--junit", str(tmp_path / "out")]) == 2
+        assert "the folder of the results; name a file" in capsys.readouterr().err
 
 
 def test_a_dry_run_leaves_a_summary(study: Path, tmp_path: Path) -> None:

@@ -79,6 +79,9 @@ def test_the_wires_of_another_simulator_are_one_input(study: Path, tmp_path: Pat
     assert (row["what"], row["before"]) == ("input of a: simulated.files", "(none)")
     assert row["after"].startswith("2 files, ")
     assert of_two_simulators(tmp_path / "before", tmp_path / "after")
+    path.write_text(json.dumps(result | {"role": "calibration"}), encoding="utf-8")
+    (row,) = what_differs(tmp_path / "before", tmp_path / "after")
+    assert (row["what"], row["after"]) == ("manifest of a: role", "calibration")
 
 
 def test_a_simulator_that_wrote_nothing_for_one_case_is_still_the_same(study: Path, tmp_path: Path) -> None:
@@ -150,6 +153,19 @@ def test_shards_of_different_settings_are_not_pooled(
     assert main(["report", *words]) == 0
     assert why_not_pooled(out) == ""
     assert len(pd.read_csv(out / "overall.csv")) == 1
+
+
+def test_shards_of_arrays_of_other_sizes_are_not_pooled(study: Path, tmp_path: Path) -> None:
+    """A case of the earlier array lay on top of the later one's, with the error of a scan that had been replaced."""
+    out = tmp_path / "out"
+    for shard in ("1/1", "1/2", "2/2"):
+        place = tmp_path / shard.replace("/", "of")
+        assert main(["run", str(study), "-o", str(place), *COMPARED, "--shard", shard]) == 0
+        shutil.copytree(place, out, dirs_exist_ok=True)
+    assert "shards of arrays of 1 and of 2 were merged" in why_not_pooled(out)
+    # into one folder the later array takes over the earlier one's cases
+    assert main(["run", str(study), "-o", str(out), *COMPARED, "--shard", "1/2"]) == 0
+    assert why_not_pooled(out) == ""
 
 
 def test_shards_that_ended_at_different_stages_are_not_pooled(study: Path, tmp_path: Path) -> None:
