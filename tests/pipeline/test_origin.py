@@ -79,9 +79,10 @@ def test_the_wires_of_another_simulator_are_one_input(study: Path, tmp_path: Pat
     assert (row["what"], row["before"]) == ("input of a: simulated.files", "(none)")
     assert row["after"].startswith("2 files, ")
     assert of_two_simulators(tmp_path / "before", tmp_path / "after")
-    path.write_text(json.dumps(result | {"role": "calibration"}), encoding="utf-8")
-    (row,) = what_differs(tmp_path / "before", tmp_path / "after")
-    assert (row["what"], row["after"]) == ("manifest of a: role", "calibration")
+    role = {"role": "calibration"}
+    path.write_text(json.dumps(result | role | {"summary": result["summary"] | role}), encoding="utf-8")
+    rows = what_differs(tmp_path / "before", tmp_path / "after")
+    assert [(row["what"], row["after"]) for row in rows] == [("manifest of a: role", "calibration")]
 
 
 def test_a_simulator_that_wrote_nothing_for_one_case_is_still_the_same(study: Path, tmp_path: Path) -> None:
