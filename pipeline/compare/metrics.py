@@ -5,7 +5,7 @@ and how a case pools it. ``register`` adds one, with its column.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -254,6 +254,14 @@ def measured(name: str, metric: Metric, pair: Pair) -> float | bool:
 
 
 def register(column: Column, metric: Metric) -> None:
-    """Add a metric and its column: errors.csv, summary.csv, the pages and the list of columns have it from then on."""
-    ERRORS.add(column)
+    """Add a metric and its column: errors.csv, summary.csv, the pages and the list of columns have it from then on.
+
+    Its results are never kept from an earlier run, as nobody knows what else it depends on.
+    """
+    ERRORS.add(replace(column, module=module_of(metric)))
     METRICS[column.name] = metric
+
+
+def module_of(function: Callable[..., object]) -> str:
+    """The module that a function stands in; of a partial, that of what it calls."""
+    return getattr(getattr(function, "func", function), "__module__", None) or "?"
