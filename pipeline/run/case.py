@@ -109,7 +109,7 @@ def _why_again(job: Job, key: Callable[[], str]) -> str | None:
         return f"{wrong}: computed again"
     own = [column.name for column in ERRORS if column.module]
     if found.ok and own:  # of a function we know neither what it closes over nor which modules it calls
-        return f"never kept, since they are made by functions of your own: {listed(own)}: computed again"
+        return f"results of functions of your own ({listed(own)}) are never kept: computed again"
     return None if found.ok else ""
 
 
