@@ -57,6 +57,14 @@ def test_two_frames_prove_nothing_and_cases_of_one_insertion_are_one() -> None:
     assert fit_of(seen, several, SCORED), "one of its cases lies elsewhere"
 
 
+def test_of_many_insertions_the_nearest_two_dozen_are_guesses() -> None:
+    """Of all 500 cases in one phantom it would take ten minutes."""
+    own = traces(0.0)
+    for count in (3, 30):
+        others = Others([(f"{n}", traces(float(n))) for n in range(count)], own)
+        assert len(others.nearest(*own[0])) == min(count, 24)
+
+
 def ring(fits: dict[str, str]) -> set[str]:
     """The cases, each an insertion of its own, that stand in a ring."""
     cases = {*fits, *fits.values()}
