@@ -81,8 +81,7 @@ class Pair:
     """The simulated wire and the traced curve of one frame, and where they are compared.
 
     Points are LPS mm, from the entry to the tip.
-    wire_mm (k, 3), curve_mm (m, 3) : joints of the wire, points of the curve.     curve_length_mm : length of the
-    curve.
+    wire_mm (k, 3), curve_mm (m, 3) : joints of the wire, points of the curve.
     sample_mm (n, 3), arc_mm (n,) : the compared points of the wire, in equal steps along it, and their arc lengths.
     Equal steps make errors independent of the length of the segments. The beginning, to which the clamp was fitted, is
     left out.
@@ -95,7 +94,6 @@ class Pair:
 
     wire_mm: Array
     curve_mm: Array
-    curve_length_mm: float
     sample_mm: Array
     arc_mm: Array
     error_mm: Array
@@ -144,7 +142,6 @@ def pair_of(
     return Pair(
         wire,
         curve,
-        traced.length_mm,
         points,
         arc,
         error,

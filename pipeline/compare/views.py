@@ -118,7 +118,7 @@ def pair_in(screen: Screen, wire_mm: Array, fitted: bool, lumen: Lumen, way: Ves
         raise ValueError("nothing of the wire or of the polyline is left to be compared: check points_px and the depth")
     back = point_to_curve(seen, whole)[0]
     none = np.zeros(0)
-    return Pair(whole, screen.curve_mm, length, points, arc, error, foot, back, none, lumen, way)
+    return Pair(whole, screen.curve_mm, points, arc, error, foot, back, none, lumen, way)
 
 
 def _apart(wire_mm: Array, curve_mm: Array) -> float:
