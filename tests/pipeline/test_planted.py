@@ -373,7 +373,7 @@ def test_other_insertions_are_looked_at_where_the_simulated_wire_is(out: Path, m
         for case in with_another(out, found):
             for frame in case.frames.values():
                 counts = np.array([count for _, count in frame.guesses.values()])
-                np.testing.assert_allclose((counts - 1) * step_mm, (len(frame.error_mm) - 1) * 0.5, atol=0.5)
+                np.testing.assert_allclose((counts - 1) * step_mm, (len(frame.error_mm) - 1) * 0.5, rtol=0.0, atol=0.5)
 
 
 def test_what_the_wire_ends_with_is_pooled_over_its_points(out: Path) -> None:
