@@ -54,6 +54,8 @@ class Column:
     """The PLACES that show it, each with what a legend calls it there."""
     style: str = ""
     """How figures draw it, a name of ``figures._style.LINES``; empty: in a colour that the panel does not use."""
+    module: str = ""
+    """Where what computes it stands, of one that was registered; empty for those of columns.toml."""
 
     def __post_init__(self) -> None:
         """Refuse what would be ignored in silence."""
@@ -109,9 +111,14 @@ class Table:
         return tuple(c for place in places for c in self.columns if place in c.shown)
 
     def add(self, column: Column) -> None:
-        """Take in a column from outside, at the end, and its pooled column; ValueError where it is there."""
+        """Take in a column from outside, at the end, and its pooled column; ValueError where it is there.
+
+        One that the same module registers again, as a notebook's cell that is run twice does, replaces the earlier one.
+        """
         if column.name in self.names:
-            raise ValueError(f"{self.file} has a column {column.name!r}; choose another name")
+            if self[column.name].module != column.module or not column.module:
+                raise ValueError(f"{self.file} has a column {column.name!r}; choose another name")
+            self._drop(self[column.name])
         self.columns = (*self.columns, column)
         self._pool(column)
 
@@ -122,6 +129,11 @@ class Table:
             near = difflib.get_close_matches(unknown[0], self.names, n=1)
             hint = f"did you mean {near[0]}?" if near else f"known columns: {', '.join(self.names)}"
             raise ValueError(f"unknown column {unknown[0]!r} in {where}; {hint}")
+
+    def _drop(self, column: Column) -> None:
+        self.columns = tuple(one for one in self.columns if one != column)
+        if self._pooled_in and column.pooled:
+            self._pooled_in._drop(column.pooled_column())
 
     def _pool(self, column: Column) -> None:
         if self._pooled_in and column.pooled and column.pooled_name not in self._pooled_in.names:

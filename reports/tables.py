@@ -7,6 +7,7 @@ import csv
 import gzip
 import io
 import math
+import zlib
 from collections import defaultdict
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
@@ -18,7 +19,7 @@ import pandas as pd
 
 from reports.atomic import write_bytes
 from reports.schema import Column, Table
-from reports.texts import size_of
+from reports.texts import opened, unreadable
 
 Row = Mapping[str, object]
 # not their names, which pandas looks up once a column and table: half the time of reading small ones
@@ -33,6 +34,7 @@ _WHOLE, _TRUTH = (int, np.integer), (bool, np.bool_)
 _KINDS: dict[str, tuple[type[Any], ...]] = {
     "float": (*_WHOLE, float, np.floating), "integer": _WHOLE, "boolean": _TRUTH, "text": (str,),
 }  # fmt: skip
+_POINTER = b"version https://git-lfs"
 _BOOLEANS = {"True": True, "true": True, "1": True, "False": False, "false": False, "0": False}
 
 
@@ -121,17 +123,26 @@ def _own_text(value: Any) -> Any:
 
 
 def read(path: Path, table: Table) -> pd.DataFrame:
-    """Read a table; a column that the file lacks is NA, one that it has in excess is kept at the end."""
+    """Read a table; a column that the file lacks is NA, one that it has in excess is kept at the end.
+
+    Raises ValueError, naming the file, where it is no table, cannot be unpacked, or a field is not of its kind.
+    """
     # numbers are parsed as such: to take them from text, column after column, was half the time of a page of 500 cases
     kinds = {c.name: _DTYPES[c.kind] for c in table if c.kind in ("float", "integer")}
     kept: Any = {"keep_default_na": False, "na_values": [""]}
-    size_of(path)
+    with opened(path) as file:
+        if file.read(len(_POINTER)) == _POINTER:
+            raise unreadable(path, "a pointer of Git LFS, not the table; fetch the table with `git lfs pull`")
     try:
         raw = pd.read_csv(path, dtype=defaultdict(lambda: _DTYPES["text"], kinds), **kept)
         texts = [c.name for c in table if c.kind == "text" and c.name in raw]
         if texts and (path.suffix == ".gz" or b"'" in path.read_bytes()):  # few tables have any
             raw = raw.assign(**{name: raw[name].map(_own_text) for name in texts})
+        if set(table.names).isdisjoint(raw):
+            raise ValueError("it has none of the columns")
         return _conform(raw, table)
+    except (OSError, EOFError, zlib.error) as error:
+        raise unreadable(path, f"cut short or altered ({error}); copy it again") from error
     except (ValueError, TypeError) as error:
         raise ValueError(
             f"{path}: a field is not what its column says ({error}); write it again with `wireval run`"

@@ -68,7 +68,8 @@ class Insertions:
         given: Any = list(depths_mm) if isinstance(depths_mm, Iterator) else depths_mm
         own = isinstance(given, LISTS) and any(isinstance(depths, (*LISTS, range)) for depths in given)
         depths = _one_each("depths_mm", given, count) if own else [given] * count
-        rolls = _one_each("roll_deg", roll_deg, count) if isinstance(roll_deg, LISTS) else [roll_deg] * count
+        each = isinstance(roll_deg, LISTS) and getattr(roll_deg, "ndim", 1) > 0
+        rolls = _one_each("roll_deg", roll_deg, count) if each else [roll_deg] * count
         goals = [one._goals(d, r) for one, d, r in zip(self.insertions, depths, rolls, strict=True)]
         jobs = [Job(one, *goal[:2], []) for one, goal in zip(self.insertions, goals, strict=True)]
         kinds: dict[Any, deque[Job]] = {}

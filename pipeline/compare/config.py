@@ -17,5 +17,5 @@ class CompareConfig:
     skip_mm: Millimetres = 10.0
     """Length of wire behind the entry that no score counts, since the clamp was fitted there."""
     simulated_nulls: bool = True
-    """Whether simulators without the roll and without the tip's curve are among the predictors, and entries.csv is
-    written. That takes 17 more insertions."""
+    """Whether simulators without the roll and without the tip's curve are among the predictors, traces may speak for
+    another curve of the tip, and entries.csv is written. That takes 20 more insertions, of a straight wire 4."""

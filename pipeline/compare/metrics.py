@@ -5,7 +5,7 @@ and how a case pools it. ``register`` adds one, with its column.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -81,8 +81,7 @@ class Pair:
     """The simulated wire and the traced curve of one frame, and where they are compared.
 
     Points are LPS mm, from the entry to the tip.
-    wire_mm (k, 3), curve_mm (m, 3) : joints of the wire, points of the curve.     curve_length_mm : length of the
-    curve.
+    wire_mm (k, 3), curve_mm (m, 3) : joints of the wire, points of the curve.
     sample_mm (n, 3), arc_mm (n,) : the compared points of the wire, in equal steps along it, and their arc lengths.
     Equal steps make errors independent of the length of the segments. The beginning, to which the clamp was fitted, is
     left out.
@@ -95,7 +94,6 @@ class Pair:
 
     wire_mm: Array
     curve_mm: Array
-    curve_length_mm: float
     sample_mm: Array
     arc_mm: Array
     error_mm: Array
@@ -144,7 +142,6 @@ def pair_of(
     return Pair(
         wire,
         curve,
-        traced.length_mm,
         points,
         arc,
         error,
@@ -254,6 +251,14 @@ def measured(name: str, metric: Metric, pair: Pair) -> float | bool:
 
 
 def register(column: Column, metric: Metric) -> None:
-    """Add a metric and its column: errors.csv, summary.csv, the pages and the list of columns have it from then on."""
-    ERRORS.add(column)
+    """Add a metric and its column: errors.csv, summary.csv, the pages and the list of columns have it from then on.
+
+    Its results are never kept from an earlier run, as nobody knows what else it depends on.
+    """
+    ERRORS.add(replace(column, module=module_of(metric)))
     METRICS[column.name] = metric
+
+
+def module_of(function: Callable[..., object]) -> str:
+    """The module that a function stands in; of a partial, that of what it calls."""
+    return getattr(getattr(function, "func", function), "__module__", None) or "?"

@@ -6,7 +6,7 @@ the others, and skill is never measured against them. ``register`` adds one, wit
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -15,7 +15,7 @@ from pipeline.arrays.grids import around
 from pipeline.arrays.polyline import at_arc, samples, smooth, to_length
 from pipeline.compare.branches import branches_of
 from pipeline.compare.config import CompareConfig
-from pipeline.compare.metrics import VesselAxis, point_to_curve, rms, scored
+from pipeline.compare.metrics import VesselAxis, module_of, point_to_curve, rms, scored
 from pipeline.compare.pinned import pinned
 from pipeline.compare.taut import pulled_tight
 from pipeline.compare.ways import cheapest_ways, nearest
@@ -181,10 +181,11 @@ def register(name: str, label: str, meaning: str, guess: Guess, told: str = "") 
     """Add a predictor; its column ``null_<name>_rms_mm`` is in errors.csv, summary.csv and the pages from then on.
 
     label : what legends call it.     meaning : one line for the list of columns.     told : as in TOLD; empty: it
-    sees neither the frame nor a later one.
+    sees neither the frame nor a later one.     What it guesses is never kept from an earlier run.
     """
-    ERRORS.add(predictor(name, label, meaning))
+    ERRORS.add(replace(predictor(name, label, meaning), module=module_of(guess)))
     NULLS[name] = guess
+    TOLD.pop(name, None)
     TOLD.update({name: told} if told else {})
 
 

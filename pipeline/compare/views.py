@@ -79,12 +79,11 @@ def shift_of(screen: Screen, wire_mm: Array, fitted: bool) -> Array:
     """
     if not fitted:
         return np.zeros(3)
-    length = float(arc_length(wire_mm)[-1])
-    arc = np.arange(max(length - FIT_TO_MM, 0.0), length - FIT_FROM_MM + 1e-9, 1.0)
-    if len(arc) < LEAST_FIT_MM:
-        need = FIT_FROM_MM + LEAST_FIT_MM
+    length, need = float(arc_length(wire_mm)[-1]), FIT_FROM_MM + LEAST_FIT_MM
+    if length < need - 1e-9:
         takes = f"a shift takes {need:g} mm or more, fitted {FIT_FROM_MM:g} mm behind the tip and further"
         raise ValueError(f'the wire is {length:.1f} mm long: {takes}; leave the frame out, or translation = "none"')
+    arc = np.arange(max(length - FIT_TO_MM, 0.0), length - FIT_FROM_MM + 1e-9, 1.0)
     part, axes, shift = screen.flat(at_arc(wire_mm, arc)), screen.axes, np.zeros(2)
     ridge = np.eye(2) * len(arc) / FREE_MM**2
     for _ in range(ROUNDS):
@@ -119,7 +118,7 @@ def pair_in(screen: Screen, wire_mm: Array, fitted: bool, lumen: Lumen, way: Ves
         raise ValueError("nothing of the wire or of the polyline is left to be compared: check points_px and the depth")
     back = point_to_curve(seen, whole)[0]
     none = np.zeros(0)
-    return Pair(whole, screen.curve_mm, length, points, arc, error, foot, back, none, lumen, way)
+    return Pair(whole, screen.curve_mm, points, arc, error, foot, back, none, lumen, way)
 
 
 def _apart(wire_mm: Array, curve_mm: Array) -> float:

@@ -157,7 +157,10 @@ def read_curve(path: Path) -> Curve:
 
 
 def read_truth(path: Path, frame_count: int | None) -> list[Array]:
-    """True wires, one (n, 3) LPS mm curve per frame from the entry to the tip. frame_count : None where not known."""
+    """True wires, one (n, 3) LPS mm curve per frame from the entry to the tip; repeated points are dropped.
+
+    frame_count : None where not known.
+    """
     expected = '{"frames": [{"points_mm": [[x, y, z], ...]}]}'
     found = read_json(path, expected)
     try:
@@ -173,9 +176,10 @@ def read_truth(path: Path, frame_count: int | None) -> list[Array]:
     frame_count = len(curves) if frame_count is None else frame_count
     if len(curves) != frame_count or any(c.ndim != 2 or c.shape[1] != 3 for c in curves):
         raise unusable(path, f"holds {len(curves)} curves, expected {frame_count} of shape (n, 3), one per frame")
+    curves = [distinct(curve) for curve in curves]
     for number, curve in enumerate(curves):
-        apart = len(distinct(curve))
-        if apart < 2:
-            raise unusable(path, f"frame {number} holds {apart} points; expected two or more, apart from each other")
+        if len(curve) < 2:
+            got = f"frame {number} holds {len(curve)} points"
+            raise unusable(path, f"{got}; expected two or more, apart from each other")
         reachable(path, curve, f"frame {number}: points")
     return curves

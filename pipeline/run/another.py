@@ -12,13 +12,14 @@ import numpy as np
 from scipy.cluster.hierarchy import DisjointSet
 
 from pipeline.arrays.polyline import at_arc, samples
+from pipeline.compare.config import CompareConfig
 from pipeline.compare.metrics import point_to_curve, scored
 from pipeline.compare.nulls import ANOTHER
 from pipeline.model import Array
 from pipeline.run.kin import SAME_ENTRY_MM, with_kin
 from pipeline.run.overall import Found, phantoms_of
 from pipeline.run.stages.repeated import ALIKE, ONE_WIRE
-from pipeline.run.traced import Traces, skip_mm_of, traces_of
+from pipeline.run.traced import Traces, compare_of, traces_of
 from reports.case_files import listed
 from reports.doubts import COUNT_AS
 
@@ -30,7 +31,6 @@ NEAREST_MM = 2.0
 that is farther off stands in for one that is missing, and what is lost would make the wire look better."""
 ANOTHER_ROLL_DEG = 0.1
 """Rolls that differ by less are one: nobody reads them to that, and 0.02 degrees made three insertions of one."""
-STEP_MM = 0.5
 MOST_OTHERS = 24
 """Most traces in a guess, those of the nearest depths: with all of 500 cases in one phantom it would take ten minutes,
 and the root mean square over 24 is known to about a seventh of itself (1 / sqrt(48))."""
@@ -45,8 +45,8 @@ def with_another(out: Path, found: Sequence[Found]) -> list[Found]:
     shared = of_one_phantom(found)
     own = {case.result.case: cases for cases in shared for case in cases}
     traces = {case.result.case: traces_of(out, case) for cases in shared for case in cases}
-    skip_mm = skip_mm_of(out, shared[0][0]) if shared else 0.0
-    return [_with_another(c, own[c.result.case], traces, skip_mm) if c.result.case in own else c for c in found]
+    config = compare_of(out, shared[0][0]) if shared else CompareConfig()
+    return [_with_another(c, own[c.result.case], traces, config) if c.result.case in own else c for c in found]
 
 
 def of_one_phantom(found: Sequence[Found]) -> list[list[Found]]:
@@ -112,7 +112,7 @@ def _together(apart: Mapping[tuple[str, ...], float]) -> list[tuple[list[str], f
     return [(sorted(names), max(mm for both, mm in apart.items() if both[0] in names)) for names in sets.subsets()]
 
 
-def _with_another(case: Found, shared: Sequence[Found], traces: Mapping[str, Traces], skip_mm: float) -> Found:
+def _with_another(case: Found, shared: Sequence[Found], traces: Mapping[str, Traces], config: CompareConfig) -> Found:
     """The case, with the RMS distance of other insertions' nearest traces to the frame's own trace in each row.
 
     shared : the cases of its phantom.
@@ -122,7 +122,7 @@ def _with_another(case: Found, shared: Sequence[Found], traces: Mapping[str, Tra
     others = Others(kin, own)
     for number in frames.keys() & own:
         depth, curve = own[number]
-        arc, guesses = scored(samples(depth, STEP_MM), skip_mm), dict[str, tuple[float, int]]()
+        arc, guesses = scored(samples(depth, config.sample_mm), config.skip_mm), dict[str, tuple[float, int]]()
         for insertion, wire in others.nearest(depth, curve):
             off = point_to_curve(at_arc(wire, arc), curve)[0]
             squares, count = guesses.get(insertion, (0.0, 0))

@@ -11,8 +11,6 @@ from time import perf_counter
 from typing import Any
 
 import solver
-from pipeline.compare.metrics import METRICS
-from pipeline.compare.nulls import NULLS
 from pipeline.run import ledger, outputs, results
 from pipeline.run.cache import Store
 from pipeline.run.hashing import hashing
@@ -22,12 +20,13 @@ from pipeline.run.log import CaseProgress, Log, Stage
 from pipeline.run.occupied import held
 from pipeline.run.provenance import code_state, package_version, peak_memory_mib, this_run
 from pipeline.run.stages import Context, Known, run_stages
-from pipeline.run.store import code_of, digest
+from pipeline.run.store import digest
 from pipeline.run.view import LumenFiles, write_view
 from pipeline.study.manifest import Case
 from pipeline.study.settings import Resolved
 from reports import tables
 from reports.atomic import WriteError, writing
+from reports.case_files import listed
 from reports.case_page import render_case
 from reports.page import Each, compiled
 from reports.schema import BUDGET, ENTRIES, ERRORS, POINTS, TIMINGS
@@ -71,13 +70,11 @@ class Job:
 
     @property
     def key(self) -> str:
-        """Cache key of what the result depends on: case, contents of files, settings, code, what is registered."""
+        """Cache key of what the result depends on: case, contents of files, settings, code, columns."""
         code = (package_version(), hash_of(Path(__file__)))
-        # what is registered also adds its column to ERRORS
-        registered = [*map(code_of, METRICS.values()), *map(code_of, NULLS.values())]
         given = self.settings.calibrated and self.settings.calibrated[0]
         named = (self.simulator,) if self.simulator else ()  # the page names the simulator
-        return digest((self.case, self.settings.config, given, self.until, code, ERRORS.columns, registered, *named))
+        return digest((self.case, self.settings.config, given, self.until, code, ERRORS.columns, *named))
 
 
 def clear(folder: Path) -> None:
@@ -111,6 +108,9 @@ def _why_again(job: Job, key: Callable[[], str]) -> str | None:
     if found.status == "damaged":
         wrong, _, _ = str(found.failures[0]["message"]).rpartition("; ")
         return f"{wrong}: computed again"
+    own = [column.name for column in ERRORS if column.module]
+    if found.ok and own:  # of a function we know neither what it closes over nor which modules it calls
+        return f"results of functions of your own ({listed(own)}) are never kept: computed again"
     return None if found.ok else ""
 
 

@@ -50,14 +50,15 @@ def _of_one(first: Path, second: Path, tolerance: Mapping[str, float]) -> Verdic
     """The verdict on two runs."""
     allowed = 1.0 + tolerance[RATIO]
     before, after = found_cases(first), found_cases(second)
-    if bad := damaged(before):
+    held = [*before, *golden_cases(first)]
+    if bad := damaged(held):
         case, why = next(iter(bad.items()))
         raise ValueError(f"case {case!r} of the first run cannot be held against: {why}")
     there = {case.result.case for case in before}
     unread = {folder.name for folder in find_cases(second)} & there - {case.result.case for case in after}
     lost = dict.fromkeys(sorted(unread), f"{RESULT} is missing") | damaged(after)
     frames = diff_folders(first, second, tolerance, lost)
-    paired = ratio([*before, *golden_cases(first)], after)
+    paired = ratio(held, after)
     judged: Judged = "holds"
     if paired is None or math.isnan(paired.low):
         judged = "withheld"

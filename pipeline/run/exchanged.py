@@ -11,11 +11,12 @@ from typing import NamedTuple
 import numpy as np
 
 from pipeline.arrays.polyline import at_arc, samples
+from pipeline.compare.config import CompareConfig
 from pipeline.compare.metrics import point_to_curve, scored
 from pipeline.model import Array, arc_length
-from pipeline.run.another import STEP_MM, Others, of_one_phantom
+from pipeline.run.another import Others, of_one_phantom
 from pipeline.run.overall import Found
-from pipeline.run.traced import arrays_of, skip_mm_of, traces_of
+from pipeline.run.traced import arrays_of, compare_of, traces_of
 
 LOOKED_AT, FEWEST, NEARER, IN_ALL = 6, 3, 0.7, 0.5
 """Frames, spread over a case, that are looked at; how many of them, all but one, must be nearer to the other insertion;
@@ -39,14 +40,14 @@ def exchanged(out: Path, found: Sequence[Found]) -> list[str]:
     said = []
     for cases in of_one_phantom(found):
         traces = {case.result.case: traces_of(out, case) for case in cases}
-        skip_mm, fits = skip_mm_of(out, cases[0]), dict[str, Fit]()
+        config, fits = compare_of(out, cases[0]), dict[str, Fit]()
         for case in cases:
             kin = [(c.insertion, traces[c.result.case]) for c in cases if c.insertion != case.insertion]
             own, simulated = traces[case.result.case], arrays_of(out, case, "simulated_mm")
             seen = [
                 (*own[n], simulated[n]) for n in _spread(sorted(case.frames.keys() & own.keys() & simulated.keys()))
             ]
-            fit = fit_of(seen, Others(kin, own), skip_mm)
+            fit = fit_of(seen, Others(kin, own), config)
             if fit is not None:
                 fits[case.result.case] = fit
         ring = in_a_ring(fits, {case.result.case: case.insertion for case in cases})
@@ -64,7 +65,7 @@ def _spread(numbers: Sequence[int]) -> list[int]:
     return [numbers[n] for n in np.unique(np.linspace(0, len(numbers) - 1, LOOKED_AT).astype(int))] if numbers else []
 
 
-def fit_of(seen: Sequence[tuple[float, Array, Array]], others: Others, skip_mm: float) -> Fit | None:
+def fit_of(seen: Sequence[tuple[float, Array, Array]], others: Others, config: CompareConfig) -> Fit | None:
     """The insertion whose traces simulated wires are far nearer to than to their own, nearly all of them.
 
     seen : depth in mm, trace (n, 3) and simulated wire (m, 3) of a few frames.
@@ -74,7 +75,8 @@ def fit_of(seen: Sequence[tuple[float, Array, Array]], others: Others, skip_mm: 
         nearest: dict[str, tuple[float, float]] = {}
         for insertion, trace in others.nearest(depth, curve):
             # as long as both traces: the depths are nearly the same
-            arc = scored(samples(min(float(arc_length(c)[-1]) for c in (curve, trace, wire)), STEP_MM), skip_mm)
+            shortest_mm = min(float(arc_length(c)[-1]) for c in (curve, trace, wire))
+            arc = scored(samples(shortest_mm, config.sample_mm), config.skip_mm)
             other, own = (float(np.mean(point_to_curve(at_arc(wire, arc), c)[0] ** 2)) for c in (trace, curve))
             nearest[insertion] = min(nearest.get(insertion, (np.inf, np.inf)), (other, own))
         for insertion, pair in nearest.items():

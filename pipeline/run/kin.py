@@ -3,7 +3,7 @@
 Without that the others' wires are no guess for one (``another``), and any simulator looks better than it is.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
@@ -32,7 +32,7 @@ STEP_MM = 1.0
 PLACED = "lies where "
 """How the name of a phantom begins that is known by where its wires lie."""
 MOST = 60
-"""Phantoms that are held against each other: 1,770 pairs take half a second."""
+"""The most phantoms that are held against each other: 1,770 pairs take half a second."""
 
 
 class Placed(NamedTuple):
@@ -50,7 +50,12 @@ def with_kin(out: Path, found: Sequence[Found]) -> list[Found]:
         if in_one_place(one.wire_mm, other.wire_mm):
             for case in (one.case, other.case):
                 names.setdefault(case, []).append(f"{PLACED}{one.case} and {other.case} do")
-    return [replace(c, result=replace(c.result, names=(*c.result.names, *names.get(c.result.case, ())))) for c in found]
+    return [_named(case, (*case.result.names, *names.get(case.result.case, ()))) for case in found]
+
+
+def _named(case: Found, names: Iterable[str]) -> Found:
+    """The case with these names for its phantom."""
+    return replace(case, result=replace(case.result, names=tuple(names)))
 
 
 def told_of_kin(out: Path, found: Sequence[Found]) -> tuple[list[str], list[str]]:
@@ -70,7 +75,13 @@ def told_of_kin(out: Path, found: Sequence[Found]) -> tuple[list[str], list[str]
         'put their scans in one place and state it (phantom = "A"), since each is a guess for the others; if not, '
         "state a name for each"
     ]
-    return taken * bool(placed), doubt * bool(shaped)
+    bare = [_named(case, [name for name in case.result.names if not name.startswith(PLACED)]) for case in found]
+    count = len(_by_phantom(bare))
+    left_out = [
+        f"of {count} phantoms the first {MOST} alone were held against each other: whether wires of others lie in one "
+        "place is not known; give cases into one phantom the same name for it (phantom)"
+    ]
+    return taken * bool(placed) + left_out * (count > MOST), doubt * bool(shaped)
 
 
 def in_one_place(one: Array, other: Array) -> bool:
@@ -98,15 +109,21 @@ def _points(wire: Array, reach_mm: float) -> Array:
     return at_arc(wire, samples(min(reach_mm, float(arc_length(wire)[-1])), STEP_MM))
 
 
-def _strangers(out: Path, found: Sequence[Found]) -> list[tuple[Placed, Placed]]:
-    """Pairs of phantoms, as far as they are known, of which one at the least has no name."""
+def _by_phantom(found: Sequence[Found]) -> list[list[Found]]:
+    """The cases of each phantom, as far as it is known."""
     phantoms = phantoms_of(case.result for case in found)
     kin: dict[str, list[Found]] = {}
     for case in found:
         kin.setdefault(phantoms.get(case.result.case, case.result.case), []).append(case)
+    return [*kin.values()]
+
+
+def _strangers(out: Path, found: Sequence[Found]) -> list[tuple[Placed, Placed]]:
+    """Pairs of phantoms of which one at the least has no name; of MOST phantoms."""
+    kin = _by_phantom(found)
     if len(kin) < 2:
         return []
-    deepest = [placed for cases in [*kin.values()][:MOST] if (placed := _deepest(out, cases)) is not None]
+    deepest = [placed for cases in kin[:MOST] if (placed := _deepest(out, cases)) is not None]
     return [(one, other) for one, other in combinations(deepest, 2) if not (one.named and other.named)]
 
 

@@ -122,8 +122,8 @@ def _found(out: Path, result: Result, insertion: str) -> Found:
     folder = out / "cases" / result.case
     try:
         return Found(result, *_scored(folder, result, insertion), insertion)
-    except (OSError, EOFError, ValueError, KeyError) as error:
-        return Found(lost(result.case, "damaged", f"{folder / POINTS.file}: {error}", result), {})
+    except ValueError as error:
+        return Found(lost(result.case, "damaged", str(error), result), {})
 
 
 def _scored(folder: Path, result: Result, insertion: str) -> tuple[dict[int, Scored], dict[int, float]]:
@@ -132,13 +132,15 @@ def _scored(folder: Path, result: Result, insertion: str) -> tuple[dict[int, Sco
         return {}, {}
     points, errors = tables.read_if_there(folder / POINTS.file, POINTS), tables.read(folder / ERRORS.file, ERRORS)
     frame, error, arc = (points[name].to_numpy(dtype=float) for name in ("frame", "error_mm", "arc_mm"))
+    if errors["frame"].isna().any() or not {*np.unique(frame)} <= {*errors["frame"]}:
+        raise ValueError(f"{folder / ERRORS.file}: not every frame that {POINTS.file} has points of; copy it again")
     own = {number: frame == number for number in errors["frame"]}
     # field by field: pandas takes ten times as long for the few rows of a case
     rows = [{str(k): None if v is pd.NA or v != v else v for k, v in row.items()} for row in errors.to_dict("records")]
     mine = [own[row["frame"]] for row in rows]
     scored = [Scored(row, error[m], arc[m], insertion, case=result.case) for row, m in zip(rows, mine, strict=True)]
     pooled = {int(one.row["frame"]): one for one in scored if is_pooled(one.row, one.error_mm)}
-    trusted = {frame["frame"] for frame in result.frames if frame.get("stage") not in UP_TO_TRACE}
+    trusted = {frame.get("frame") for frame in result.frames if frame.get("stage") not in UP_TO_TRACE}
     known = errors[errors["frame"].isin(trusted) & errors["insertion_mm"].notna()]
     return pooled, dict(zip(known["frame"].astype(int), known["insertion_mm"].astype(float), strict=True))
 

@@ -27,17 +27,8 @@ _known: WeakKeyDictionary[Grid, str] = WeakKeyDictionary()
 
 def key_of(stage: Callable[..., Any], *inputs: Any) -> str:
     """Key of what ``stage(*inputs)`` returns: its sources, and its inputs' contents."""
-    return hashlib.sha256(f"{stage.__qualname__} {code_of(stage)} {digest(inputs)}".encode()).hexdigest()
-
-
-def code_of(function: Callable[..., Any]) -> str:
-    """SHA-256 of the sources behind a function; of its own byte code where it stands in no file, as in a notebook."""
-    function = inspect.unwrap(getattr(function, "func", function))  # a partial stands for what it calls
-    code = getattr(function, "__code__", None) or getattr(type(function).__call__, "__code__", None)
-    if code is None:  # a function of C
-        return repr(function)
-    file = Path(code.co_filename)
-    return hash_of(file) if file.is_file() else hashlib.sha256(code.co_code + repr(code.co_consts).encode()).hexdigest()
+    code = hash_of(Path(inspect.unwrap(stage).__code__.co_filename))
+    return hashlib.sha256(f"{stage.__qualname__} {code} {digest(inputs)}".encode()).hexdigest()
 
 
 def digest(value: Any) -> str:

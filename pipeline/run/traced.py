@@ -15,10 +15,12 @@ Traces = Mapping[int, tuple[float, Array]]
 """By frame, the depth in mm and the traced wire (n, 3)."""
 
 
-def skip_mm_of(out: Path, case: Found) -> float:
-    """``compare.skip_mm`` of a run, which is the same for all cases that are pooled."""
-    config = read_json(out / "cases" / case.result.case / ledger.RESULT).get("config", {})
-    return float(config.get("compare", {}).get("skip_mm", {}).get("value", CompareConfig().skip_mm))
+def compare_of(out: Path, case: Found) -> CompareConfig:
+    """How a run samples curves, which is the same for all cases that are pooled: its step, and what no score counts."""
+    known = read_json(out / "cases" / case.result.case / ledger.RESULT).get("config", {}).get("compare", {})
+    plain = CompareConfig()
+    sample, skip = (float(known.get(name, {}).get("value", getattr(plain, name))) for name in ("sample_mm", "skip_mm"))
+    return CompareConfig(sample, skip)
 
 
 def arrays_of(out: Path, case: Found, name: str) -> dict[int, Array]:

@@ -16,6 +16,7 @@ from scipy.spatial import cKDTree
 from pipeline.arrays.grids import unflattened
 from pipeline.arrays.jets import Blurred, smooth_voxels, values_at
 from pipeline.arrays.lattice import sparse_zeros
+from pipeline.arrays.polyline import across
 from pipeline.segment._kernels.connect import Affinity
 from pipeline.segment._kernels.solids import cones
 from pipeline.segment._kernels.voxels import components, gaps, shell
@@ -74,8 +75,7 @@ def _axis(grid: Grid, start: Array, stop: Array) -> Array:
     """The axis (n, 3) of a neck, voxels: the brightest points beside the straight way from ``start`` to ``stop``."""
     way = stop - start
     share = np.linspace(0.0, 1.0, int(np.ceil(2.0 * np.linalg.norm(way))) + 1)
-    u = np.cross(way, np.eye(3)[int(np.argmin(np.abs(way)))])
-    u, v = u / np.linalg.norm(u), np.cross(way, u) / np.linalg.norm(np.cross(way, u))
+    u, v = across(way / np.linalg.norm(way))
     steps = np.arange(-SIDE_VOXELS, SIDE_VOXELS + 0.1, 0.5)
     beside = (steps[:, None, None] * u + steps[None, :, None] * v).reshape(-1, 3)
     places = start + share[:, None, None] * way + beside

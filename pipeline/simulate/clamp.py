@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.arrays.polyline import at_arc, tangents
+from pipeline.arrays.polyline import across, at_arc, tangents
 from pipeline.model import Array, Clamp, Curve
 from pipeline.simulate.clamp_told import REACH_MM, clamp_told, left_out
 from pipeline.simulate.departures import departed
@@ -86,10 +86,7 @@ def depth_from(clamp: Clamp, curve: Curve) -> float:
 
 def axes_of(direction: Array) -> Array:
     """Rows (3, 3): the direction, and two axes across it."""
-    across = np.eye(3)[np.argmin(np.abs(direction))]
-    first = np.cross(direction, across)
-    first /= np.linalg.norm(first)
-    return np.array([direction, first, np.cross(direction, first)])
+    return np.array([direction, *across(direction)])
 
 
 def moved(given: Clamp, step: Array) -> Clamp:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,6 +15,7 @@ from data_synthetic.anatomy.tubes import Anatomy
 from data_synthetic.rod.relax import Equilibrium, relax
 from data_synthetic.rod.replay import TrueFrame, TrueInsertion, replay
 from data_synthetic.rod.rod import Rod, TrueWire, cell_means, edge_lengths, make_rod, shape_from_points
+from data_synthetic.rod.truth import cached_replay
 from tests.later import later
 
 Array = NDArray[np.float64]
@@ -141,3 +144,19 @@ def test_rigid_motion_moves_the_truth_along(bend: Anatomy) -> None:
     moved = Anatomy(tuple(replace(t, points_mm=t.points_mm @ turn.T, tangents=t.tangents @ turn.T) for t in bend.tubes))
     there = next(iter(replay(insertion(moved, 0.4, material_axis=turn @ X), [20.0], 30.0)))
     np.testing.assert_allclose(here.points_mm @ turn.T, there.points_mm, rtol=0.0, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    "spoil", [lambda whole: whole[:-100], lambda whole: b"", lambda whole: whole[:60] + whole[70:]]
+)
+def test_a_damaged_file_of_the_cache_is_a_miss(
+    bend: Anatomy, spoil: Callable[[bytes], bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A file that was cut short ended in a traceback of zipfile."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    given = insertion(bend, 0.8), [4.0], [0.0]
+    (before,) = cached_replay(*given)
+    (path,) = tmp_path.rglob("*.npz")
+    path.write_bytes(spoil(path.read_bytes()))
+    (again,) = cached_replay(*given)
+    np.testing.assert_array_equal(again.points_mm, before.points_mm)

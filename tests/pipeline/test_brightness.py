@@ -51,6 +51,8 @@ def test_what_scans_of_one_wire_differ_by_is_not_told() -> None:
     faint = 500.0 * SECTION_MM2 / BODY  # as bright above medium of 900 as (900 - 100) more above medium of 100
     washed = [frame(0, 20.0, faint), frame(1, 25.0, faint), frame(2, 30.0, 1300.0 / 500.0 * faint, 100.0)]
     assert of_another_brightness(washed, RADIUS_MM) == [], "the medium is washed out about a wire hardly brighter"
+    hidden = [frame(0, 20.0, faint), frame(1, 25.0, faint), frame(2, 30.0, 100.0 / 500.0 * faint, 1300.0)]
+    assert of_another_brightness(hidden, RADIUS_MM) == [], "thicker medium hides most of a wire hardly brighter"
     still = [washed[0], washed[1], frame(2, 30.0, 1300.0 / 500.0 * faint)]
     assert "frame 2 2.6 times" in of_another_brightness(still, RADIUS_MM)[0]
 

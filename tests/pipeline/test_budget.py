@@ -33,7 +33,7 @@ from pipeline.budget.surface import offset_field
 from pipeline.budget.verdict import ROUND, axes_across, judged, reach_mm
 from pipeline.cli import main
 from pipeline.model import Array, Clamp, Curve, Lumen, Wall, Wire
-from pipeline.run.stages.budget import Work
+from pipeline.run.stages.budget import Work, _row
 from pipeline.run.stages.known import Frame
 from pipeline.simulate.config import SimulateConfig, SolverConfig
 from pipeline.simulate.evidence import TraceSamples
@@ -419,6 +419,15 @@ def test_the_table_by_source_adds_up_and_the_four_entries_are_there(out: Path) -
     assert len(errors) == entries["frames"].iloc[0]
     assert entries["rms_mm"].iloc[0] == pytest.approx(pooled, abs=1e-6), "the first row is the run's own"
     assert entries["rms_mm"].nunique() == 4
+
+
+@pytest.mark.parametrize("step_mm", [0.1, 0.5])
+def test_the_end_of_a_wire_is_counted_in_millimetres(step_mm: float) -> None:
+    """It was 20 points: of a wire looked at every 0.1 mm its last 2 mm, under "last 10 mm"."""
+    arc = np.arange(0.0, 40.0 + 1e-9, step_mm)
+    row = _row("inputs", "", [(arc, np.where(arc > 30.0 - 1e-6, 2.0, 0.0))])
+    assert row["distal_u_mm"] == 2.0
+    assert row["u_mm"] == pytest.approx(1.0, abs=0.02)
 
 
 def test_the_lines_carry_what_an_error_is_divided_by(out: Path) -> None:

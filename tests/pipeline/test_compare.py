@@ -199,6 +199,9 @@ def test_a_sac_on_the_wall_makes_no_two_vessels_of_one() -> None:
     lumen = tubes(vessel, sac)
     found = branches_of(lumen.distance, vessel[0])
     assert found.at(np.array([8.0, 0.5, 0])) & found.at(np.array([16.0, -0.5, 0]))
+    deep = np.array([[12.0, 0, 0], [12.0, 4.0, 0]])  # 4 mm beyond the wall of a vessel of 1.5 mm radius
+    found = branches_of(tubes(vessel, deep).distance, vessel[0])
+    assert found.at(np.array([4.0, 0, 0])) == found.at(np.array([12.0, 4.0, 0])) == found.at(np.array([20.0, 0, 0]))
     bend = np.array([[0.0, 0, 0], [10.0, 0, 0], [10.0, 10.0, 0]])
     one = branches_of(tubes(bend).distance, bend[0])
     assert one.at(np.array([5.0, 1.0, 0])) & one.at(np.array([11.0, 6.0, 0])), "their straight line leaves the bend"

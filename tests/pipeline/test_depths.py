@@ -282,6 +282,15 @@ def test_a_tip_behind_the_entry_names_entry_direction() -> None:
     assert "entry_direction" in frame.message
 
 
+def test_a_stated_depth_behind_the_entry_is_told_as_such() -> None:
+    """Of a frame without a trace it was said that the traced wire ends there."""
+    clamp = Clamp(np.zeros(3), np.array([0.0, 0.0, 1.0]))
+    seen = frames([depth - 1.2 for depth in DEPTHS[:5]], [1.0, *DEPTHS[1:5]])
+    found = with_depths([replace(seen[0], curve=None), *seen[1:]], "traced", clamp)[0]
+    assert "its insertion_mm, counted as the traces show that the others' were, ends 0.20 mm behind" in found.message
+    assert "traced wire" not in found.message
+
+
 def test_a_trace_that_hardly_begins_may_run_the_wrong_way() -> None:
     seen = [replace(f, expected_mm=14.0) for f in frames([0.1, 9.0, 14.0], DEPTHS[:3])]
     seen = [f.traced_by(of_length(f.curve, 14.0, TraceConfig())) for f in seen if f.curve]

@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from pipeline.compare.config import CompareConfig
 from pipeline.run.another import Others, Traces
 from pipeline.run.exchanged import Fit, fit_of, in_a_ring
 from tests.later import later
 
+SCORED = CompareConfig(skip_mm=2.0)
 DEPTHS = [20.0, 26.0, 32.0, 38.0]
 
 
@@ -27,7 +29,7 @@ def fit(simulated_deg: float, others: dict[str, float], frames: int = 4) -> Fit 
     """Of wires to a side in an insertion to 0 degrees, beside others."""
     own = traces(0.0)
     seen = [(depth, wire, bent(depth + 0.4, simulated_deg)) for depth, wire in own.values()]
-    return fit_of(seen[:frames], Others([(name, traces(angle)) for name, angle in others.items()], own), 2.0)
+    return fit_of(seen[:frames], Others([(name, traces(angle)) for name, angle in others.items()], own), SCORED)
 
 
 @pytest.mark.parametrize(
@@ -51,8 +53,16 @@ def test_two_frames_prove_nothing_and_cases_of_one_insertion_are_one() -> None:
     own = traces(0.0)
     seen = [(depth, wire, bent(depth, 90.0)) for depth, wire in own.values()]
     several = Others([("other", traces(90.0)), ("other", traces(150.0)), ("other", traces(91.0))], own)
-    assert not fit_of(seen[:1], several, 2.0), "one frame, held against three cases"
-    assert fit_of(seen, several, 2.0), "one of its cases lies elsewhere"
+    assert not fit_of(seen[:1], several, SCORED), "one frame, held against three cases"
+    assert fit_of(seen, several, SCORED), "one of its cases lies elsewhere"
+
+
+def test_of_many_insertions_the_nearest_two_dozen_are_guesses() -> None:
+    """Of all 500 cases in one phantom it would take ten minutes."""
+    own = traces(0.0)
+    for count in (3, 30):
+        others = Others([(f"{n}", traces(float(n))) for n in range(count)], own)
+        assert len(others.nearest(*own[0])) == min(count, 24)
 
 
 def ring(fits: dict[str, str]) -> set[str]:
@@ -77,7 +87,7 @@ def test_one_wire_for_all_is_a_poor_simulator_and_no_exchange(seed: int) -> None
         own = traces(angle)
         seen = [(depth, wire, bent(depth, said)) for depth, wire in own.values()]
         others = Others([(other, traces(way)) for other, way in angles.items() if other != name], own)
-        if (found := fit_of(seen, others, 2.0)) is not None:
+        if (found := fit_of(seen, others, SCORED)) is not None:
             fits[name] = found
     assert fits, "most lie nearer to another one"
     assert not in_a_ring(fits, {name: name for name in angles})

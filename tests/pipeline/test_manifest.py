@@ -396,6 +396,13 @@ def test_a_truth_of_one_point_is_none(tmp_path: Path) -> None:
         read_truth(path, 1)
 
 
+def test_a_point_of_a_truth_that_is_written_twice_counts_once(tmp_path: Path) -> None:
+    """Its step of no length hid that the truth has few points, and numpy warned."""
+    path, points = tmp_path / "truth.json", [[0.0, 0.0, 0.0], [0.0, 0.0, 5.0], [0.0, 0.0, 5.0], [0.0, 1.0, 9.0]]
+    path.write_text(json.dumps({"frames": [{"points_mm": points}]}), encoding="utf-8")
+    assert read_truth(path, 1)[0].tolist() == [points[0], points[1], points[3]]
+
+
 @pytest.mark.parametrize(("spacing", "said"), [("ElementSpacing = 0.5 0.5 0.5\n", True), ("", False)])
 def test_another_voxel_size_than_the_scan_states_is_doubted(tmp_path: Path, spacing: str, said: bool) -> None:
     """5 mm in place of 0.5 was an assumption, and a study of slices."""

@@ -221,6 +221,20 @@ def test_a_run_three_times_as_far_off_has_three_times_the_ratio_and_its_interval
     assert [other.value, other.low, other.high] == pytest.approx([3 * one.value, 3 * one.low, 3 * one.high])
 
 
+def test_a_ratio_hangs_on_no_number_of_points(tmp_path: Path) -> None:
+    """A wire of another length, or another step, has other numbers of points at the same errors."""
+    write_case(tmp_path, "a", [GOOD, BAD])
+    first = found_cases(tmp_path)
+    twice = {
+        number: frame._replace(error_mm=np.repeat(frame.error_mm, 2), arc_mm=np.repeat(frame.arc_mm, 2))
+        for number, frame in first[0].frames.items()
+    }
+    for runs in ((first, [replace(first[0], frames=twice)]), ([replace(first[0], frames=twice)], first)):
+        found = ratio(*runs)
+        assert found is not None
+        assert found.value == pytest.approx(1.0)
+
+
 def test_runs_without_a_frame_in_common_have_no_ratio(tmp_path: Path) -> None:
     write_case(tmp_path / "a", "one", [0.1])
     write_case(tmp_path / "b", "two", [0.1])

@@ -18,11 +18,13 @@ import pytest
 import SimpleITK as sitk
 
 from pipeline.cli import main
+from pipeline.compare.config import CompareConfig
 from pipeline.run import kin, ledger
 from pipeline.run.another import copies, with_another
 from pipeline.run.exchanged import exchanged
 from pipeline.run.kin import told_of_kin
 from pipeline.run.overall import Found, found_cases, phantoms_of, strangers
+from pipeline.run.traced import compare_of
 from tests.later import later
 
 # a manifest that states another wire has the same lumen and the same traces
@@ -341,6 +343,10 @@ def test_insertions_with_references_of_their_own_are_guesses_for_each_other(
         cases = zip(found_cases(out), told, strict=True)
         return [replace(c, result=replace(c.result, phantom=c.result.case, names=known)) for c, known in cases]
 
+    with monkeypatch.context() as patch:
+        patch.setattr(kin, "MOST", 2)
+        _, few = told_of_kin(out, with_another(out, stated("", "", "")))[0]
+    assert few.startswith("of 3 phantoms the first 2 alone were held against each other")
     for names in (("", "", ""), ("A", "", "")):
         joined = with_another(out, stated(*names))
         assert {name for case in joined for f in case.frames.values() for name in f.guesses} == {
@@ -356,6 +362,18 @@ def test_insertions_with_references_of_their_own_are_guesses_for_each_other(
     taken, (doubt,) = told_of_kin(out, with_another(out, stated("", "", "C")))
     assert not taken
     assert doubt.startswith("the wires of cases bend, bend-2, bend-3 have one shape and lie in other places")
+
+
+def test_other_insertions_are_looked_at_where_the_simulated_wire_is(out: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """They were half a millimetre apart, whatever compare.sample_mm said."""
+    found = found_cases(out)
+    assert compare_of(out, found[0]) == CompareConfig()
+    for step_mm in (0.5, 0.1):
+        monkeypatch.setattr("pipeline.run.another.compare_of", lambda *_, step=step_mm: CompareConfig(step))
+        for case in with_another(out, found):
+            for frame in case.frames.values():
+                counts = np.array([count for _, count in frame.guesses.values()])
+                np.testing.assert_allclose((counts - 1) * step_mm, (len(frame.error_mm) - 1) * 0.5, rtol=0.0, atol=0.5)
 
 
 def test_what_the_wire_ends_with_is_pooled_over_its_points(out: Path) -> None:

@@ -17,10 +17,12 @@ from pipeline.compare import metrics, nulls
 from pipeline.compare.metrics import Pair
 from pipeline.compare.nulls import Clues, PredictorInputs
 from pipeline.model import Array
-from pipeline.run.case import Job
+from pipeline.run import ledger
+from pipeline.run.case import Job, finished
 from pipeline.study.manifest import read_manifest
 from pipeline.study.settings import resolve
 from reports.schema import ERRORS, SUMMARY, Column
+from tests.reports.fake_results import FakeCase, write_run
 from tests.studies import metrics_page
 
 MANIFEST = """
@@ -43,20 +45,29 @@ def test_a_metric_that_raises_is_named() -> None:
         metrics.measured("near_share", lambda _: 1 / 0, None)  # type: ignore[arg-type]
 
 
-def test_a_metric_that_changed_is_another_input(as_before: None, tmp_path: Path) -> None:
-    """Its module is a file outside, or none at all, as in a notebook."""
-    keys = set()
-    for where, text in ((tmp_path / "own.py", "pair.error_mm.max()"), (tmp_path / "gone.py", "pair.error_mm.min()")):
-        source = f"own = lambda pair: float({text})"
-        where.write_text(source, encoding="utf-8")
-        names: dict[str, Any] = {}
-        exec(compile(source, where, "exec"), names)
-        if where.stem == "gone":
-            where.unlink()
-        metrics.METRICS["own_mm"] = names["own"]
-        keys.add(job_key(tmp_path))
-    assert len(keys) == 2
-    assert job_key(tmp_path) in keys
+def test_results_of_own_functions_are_not_kept(as_before: None, tmp_path: Path) -> None:
+    """What they close over, a partial's values and the modules that they call may have changed unseen."""
+    out = write_run(tmp_path, (FakeCase("tube"),))
+    ledger.write(out / "cases" / "tube", "key")
+    job = job_of(tmp_path)
+    assert finished(job, "key")
+    metrics.register(Column("own_mm", "mm", "mine"), partial(metrics.distal_rms, length_mm=5.0))
+    assert not finished(job, "key")
+
+
+@pytest.mark.parametrize("told", ["its tip", ""])
+def test_a_cell_of_a_notebook_may_be_run_again(as_before: None, told: str) -> None:
+    """It was told to choose another name. What another module registered, and the product's own, are not replaced."""
+    for limit, pooled in ((1.0, "median"), (2.0, "max")):
+        metrics.register(Column("own_mm", "mm", "mine", pooled=pooled), lambda _, limit=limit: limit)  # type: ignore[misc]
+        nulls.register("ray", "straight on", f"{limit}", straight_on, told if limit == 1.0 else "")
+    assert metrics.METRICS["own_mm"](None) == 2.0  # type: ignore[arg-type]
+    assert ERRORS.names.count("own_mm") == ERRORS.names.count("null_ray_rms_mm") == 1
+    assert ("own_median_mm" in SUMMARY.names, "own_max_mm" in SUMMARY.names) == (False, True)
+    assert "ray" in nulls.rivals()
+    for name, other in (("own_mm", len), ("rms_mm", lambda _: 0.0)):
+        with pytest.raises(ValueError, match=f"errors.csv has a column '{name}'"):
+            metrics.register(Column(name, "mm", "another"), other)
 
 
 def test_every_metric_is_defined_in_one_place() -> None:
@@ -74,25 +85,27 @@ class Scaled:
 
 @pytest.mark.parametrize("metric", [partial(lambda factor, _: factor, 2.0), Scaled(), len])
 def test_whatever_can_be_called_may_be_a_metric(as_before: None, tmp_path: Path, metric: Any) -> None:
-    metrics.METRICS["own_mm"] = metric
-    assert job_key(tmp_path) == job_key(tmp_path)
+    before = job_of(tmp_path).key
+    metrics.register(Column("own_mm", "mm", "mine"), metric)
+    assert job_of(tmp_path).key not in ("", before)
 
 
-def job_key(folder: Path) -> str:
-    """Key of a case without files."""
+def job_of(folder: Path) -> Job:
+    """The job of a case without files."""
     manifest = folder / "manifest.toml"
     manifest.write_text(MANIFEST, encoding="utf-8")
-    return Job(read_manifest(manifest).cases[0], resolve([]), folder).key
+    return Job(read_manifest(manifest).cases[0], resolve([]), folder)
 
 
 @pytest.fixture
 def as_before() -> Iterator[None]:
     """Take back what a test registers."""
     columns = ERRORS.columns, SUMMARY.columns
-    known = dict(metrics.METRICS), dict(nulls.NULLS)
+    registries: tuple[dict[str, Any], ...] = metrics.METRICS, nulls.NULLS, nulls.TOLD
+    known = [dict(registry) for registry in registries]
     yield
     ERRORS.columns, SUMMARY.columns = columns
-    for registry, entries in zip((metrics.METRICS, nulls.NULLS), known, strict=True):
+    for registry, entries in zip(registries, known, strict=True):
         registry.clear()
         registry.update(entries)
 

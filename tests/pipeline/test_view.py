@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
 
 from pipeline.model import Lumen
-from pipeline.run.view import LumenFiles, closed_surface
+from pipeline.run.stages.known import Frame
+from pipeline.run.view import LumenFiles, closed_surface, contact_at
 from solver import Grid
 
 SPACING = np.array([0.5, 0.4, 0.6])
@@ -27,6 +30,15 @@ def open_edges(triangles: np.ndarray) -> int:
     directed, counts = np.unique(edges, axis=0, return_counts=True)
     pairs = {tuple(e) for e in directed.tolist()}
     return int((counts > 1).sum()) + sum((b, a) not in pairs for a, b in pairs)
+
+
+def test_forces_of_joints_are_added_up_from_the_first_place_on() -> None:
+    """Joints in the clamp's reach are left out; the first place has those of half a step before it, too."""
+    joints = np.array([[0.0, 0, z] for z in (0.0, 9.7, 9.8, 10.0, 10.2, 10.6, 11.0)])
+    forces = np.outer([64.0, 32.0, 1.0, 2.0, 4.0, 8.0, 16.0], [0.0, 1.0, 0.0])
+    frame = cast(Frame, SimpleNamespace(solved=SimpleNamespace(joints_mm=joints, contact_force_N=forces)))
+    np.testing.assert_allclose(contact_at(frame, np.array([10.0, 10.5, 11.0])), [7.0, 8.0, 16.0])
+    assert np.isnan(contact_at(cast(Frame, SimpleNamespace(solved=None)), np.zeros(2))).all()
 
 
 @pytest.mark.parametrize("direction", [np.eye(3), TURN, MIRROR])

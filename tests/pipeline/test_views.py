@@ -15,7 +15,7 @@ import pandas as pd
 import pytest
 from numpy.typing import NDArray
 
-from pipeline.arrays.polyline import at_arc
+from pipeline.arrays.polyline import at_arc, to_length
 from pipeline.cli import main
 from pipeline.compare.config import CompareConfig
 from pipeline.compare.seen import largest_scale, require_in_order, require_not_longer
@@ -211,6 +211,14 @@ def test_a_wire_too_short_for_a_shift_fails_by_name(known: Known, tmp_path: Path
     assert main(["run", str(manifest), "-o", str(tmp_path / "out"), "--until", "compare", *QUICK]) == 1
     assert set(errors_of(tmp_path / "out")["status"]) == {"view_failed"}
     assert "a shift takes 60 mm or more" in (tmp_path / "out" / "failures.csv").read_text(encoding="utf-8")
+
+
+def test_a_shift_takes_20_mm_of_wire_beside_what_is_scored() -> None:
+    """20 points of it, a millimetre apart, were 19 mm."""
+    screen = screen_of(c_arm().matrix, CENTRE, seen(c_arm(), helix()))
+    assert np.linalg.norm(shift_of(screen, to_length(helix(), 60.1), fitted=True)) < 0.01
+    with pytest.raises(ValueError, match=r"the wire is 59\.6 mm long: a shift takes 60 mm or more"):
+        shift_of(screen, to_length(helix(), 59.6), fitted=True)
 
 
 NEAR_SOURCE = (CENTRE - 400.0 * np.array([0.3, -0.95, 0.1])).tolist()

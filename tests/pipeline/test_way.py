@@ -19,7 +19,7 @@ from pipeline.model import Clamp, Curve, Lumen
 from pipeline.run.cache import Store
 from pipeline.run.log import Log
 from pipeline.run.stages import clamp as clamp_stage
-from pipeline.run.stages import entries, rivals, roll
+from pipeline.run.stages import entries, roll, variants
 from pipeline.run.stages.budget import Work, _snapped, budgeted
 from pipeline.run.stages.given import seen_in, trial_of
 from pipeline.run.stages.known import Context, Frame, Known
@@ -28,6 +28,7 @@ from pipeline.simulate import insertion_of
 from pipeline.simulate.config import SimulateConfig, SolverConfig
 from pipeline.simulate.way import Stop, Way
 from pipeline.status import FrameStatus
+from pipeline.study.explain import described
 from pipeline.study.manifest import Case, read_manifest
 from pipeline.study.settings import Config
 from solver import Grid, Solution
@@ -173,15 +174,22 @@ def test_the_clamp_is_fitted_by_wires_that_went_through_refused_frames(
 def test_four_entries_and_rivals_go_through_refused_frames(run: Context, monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[Way] = []
     monkeypatch.setattr(entries, "together", lambda _, ways: asked.extend(ways))
-    monkeypatch.setattr(rivals, "simulate", lambda _, way: asked.append(way) or [])
+    monkeypatch.setattr(variants, "simulate", lambda _, way: asked.append(way) or [])
     scans = replace(run, case=run.case.model_copy(update={"frames": ("some",)}))
     case = known(run, [REFUSED])
     entries.replayed_entries(scans, case)
     # another simulator's wire may be missing where its file was refused
     missing = tuple(replace(f, simulated=None) if f.index == REFUSED else f for f in case.frames)
-    rivals.rival_wires(run, replace(case, frames=missing), rivals.rival_ways(run, case)[0])
+    variants.variant_wires(run, replace(case, frames=missing), variants.variants_of(run, case)[0])
     assert [said(way) for way in asked] == [WHOLE] * 5
     assert {way.read for way in asked} == {(True, False, True, True)}
+
+
+def test_the_setting_says_how_many_insertions_it_takes(run: Context) -> None:
+    """Beside those of the four entries. It said 17, as before tips that are bent otherwise."""
+    count = len(variants.variants_of(run, known(run))) + 4
+    (told,) = [setting.meaning for setting in described() if setting.key == "simulated_nulls"]
+    assert told.endswith(f"That takes {count} more insertions, of a straight wire 4.")
 
 
 def test_the_budget_of_frames_after_a_refused_one_is_what_it_would_be_without(run: Context) -> None:

@@ -105,6 +105,13 @@ def test_unknown_column_is_refused_with_a_suggestion(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
+def test_a_table_of_other_columns_is_refused(tmp_path: Path) -> None:
+    """It was one of frames without numbers."""
+    (tmp_path / "errors.csv").write_text("x,y\n1,2\n", encoding="utf-8")
+    with pytest.raises(ValueError, match=r"errors.csv: .*none of the columns"):
+        tables.read(tmp_path / "errors.csv", ERRORS)
+
+
 def test_unequal_points_are_refused(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="differ in length"):
         tables.write(tmp_path / "points.csv.gz", POINTS, {"frame": [0, 0], "arc_mm": [0.0]})

@@ -24,6 +24,7 @@ from reports.two_runs_files import _markdown
 from tests.reports.fake_results import FakeCase, write_run
 
 GROUPS = ("a", "b", "c")
+GOLDEN = ERRORS.file, POINTS.file
 
 
 @pytest.fixture(scope="module")
@@ -312,6 +313,31 @@ def test_golden_tables_alone_are_enough(
     assert "over all frames it is worse" in capsys.readouterr().out.splitlines()[-1]
 
 
+POINTER = b"version https://git-lfs.github.com/spec/v1\noid sha256:4d7a21\nsize 12345\n"
+SPOILT = {
+    "cut": lambda whole: whole[:-60], "altered": lambda whole: whole[:99] + bytes([255]) * 99 + whole[198:],
+    "pointer": lambda _: POINTER, "empty": lambda _: b"", "rows": lambda whole: b"".join(whole.splitlines(True)[:-1]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("file", "spoil"),
+    [*((POINTS.file, how) for how in ("cut", "altered", "pointer", "empty"))]
+    + [(ERRORS.file, how) for how in ("pointer", "rows")],
+)
+def test_damaged_golden_tables_are_refused(
+    first: Path, second: Path, tmp_path: Path, file: str, spoil: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """What could not be read was left out, and a gate that was closed opened with it."""
+    golden = shutil.copytree(first, tmp_path / "golden", ignore=lambda *_: {*ledger.DATA, ledger.FILE} - set(GOLDEN))
+    path = golden / "cases" / "b" / file
+    path.write_bytes(SPOILT[spoil](path.read_bytes()))
+    assert main(["diff", str(golden), str(second)]) == 2
+    said = capsys.readouterr().err
+    assert str(path) in said
+    assert ("git lfs pull" in said) == (spoil == "pointer")
+
+
 def test_what_only_the_second_run_has_is_told_apart(
     first: Path, second: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -323,6 +349,9 @@ def test_what_only_the_second_run_has_is_told_apart(
         rows = tables.read(path, ERRORS)
         rows.loc[2, "status"] = "load_failed"
         tables.write(path, ERRORS, rows.drop(index=2) if change == "drop" else rows)
+    path = less / "cases" / "b" / POINTS.file
+    points = tables.read(path, POINTS)
+    tables.write(path, POINTS, points[points["frame"] != 2])
     assert main(["diff", str(less), str(second), "--junit", str(junit)]) == 0
     said = capsys.readouterr().out.splitlines()[-1]
     assert "2 of 3 cases compared: no regression" in said

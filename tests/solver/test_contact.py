@@ -35,6 +35,14 @@ def test_push_force_where_the_first_segment_touches(quadrature: str, hull: str, 
     assert middle.push_force_N == pytest.approx((high.energy_N_mm - low.energy_N_mm) / 2e-3, rel=1e-4)
 
 
+def test_the_held_half_of_the_first_segment_bears_half() -> None:
+    """A wire that does not give way lies equally deep all along: its ends stand for half a segment each."""
+    wall = VesselWall(plane_grid(0.0), 0.1)
+    insertion = Insertion(GuideWire(1.0, 0.2, 1e7), wall, [0, 0, -0.15], [1, 0, 0], finest_mm=1.0)
+    force = last(insertion, np.array([10.0])).contact_force_N[:, 2]
+    np.testing.assert_allclose(force / (-0.1 * 0.05), [0.5, *[1.0] * 9, 0.5], rtol=1e-3)
+
+
 def test_reaction_torque_is_the_slope_of_the_energy_in_roll() -> None:
     wire = GuideWire(1.0, 0.18, STIFFNESS, 0.03)
     wall = VesselWall(bend_grid(), 1.0)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from solver import Grid, GuideWire, Insertion, Insertions, Solution, Status, VesselWall, relax
+from solver.entry import refused_at
 
 WIRE = GuideWire(0.5, 0.18, 1.0)
 
@@ -37,6 +38,15 @@ def test_one_relaxation_is_as_strict_as_an_insertion(
     assert (pushed.status, once.status) == (status, status)
     assert once.converged == (status is Status.CONVERGED)
     assert np.isnan(once.least_pivot) == (not once.converged)
+
+
+@pytest.mark.parametrize(("thinnest", "status"), [(0.7, Status.ENTRY_IN_SEPTUM), (0.3, None)])
+def test_two_lumens_are_joined_where_what_parts_them_is_half_as_thick(thinnest: float, status: Status | None) -> None:
+    """Of a septum of 1.2 mm, which is thinner 0.4 mm beside the entry."""
+    x, y, z = np.meshgrid(*[np.arange(-4.0, 4.1, 0.4)] * 3, indexing="ij")
+    half = 0.6 * np.interp(np.hypot(x, y), [0.0, 0.4], [1.0, thinnest])
+    wall = VesselWall(Grid(half - np.abs(z), [0.4] * 3, [-4.0] * 3), 1.0)
+    assert refused_at(wall, np.zeros(3)) is status
 
 
 def test_a_depth_that_is_too_long_took_nothing(two_tubes: VesselWall) -> None:

@@ -315,3 +315,4 @@ def test_one_insertion_twice_and_no_threads_are_refused() -> None:
     with pytest.raises(ValueError, match="threads"):
         Insertions([insertion], threads=0)
     assert Insertions([]).to_depths([10.0]) == []
+    assert Insertions([]).to_depths([10.0], np.array(5.0)) == [], "one number for all, as Insertion takes it"

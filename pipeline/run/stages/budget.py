@@ -26,9 +26,9 @@ from pipeline.budget import (
 )
 from pipeline.budget.frame import FEWEST
 from pipeline.budget.inputs import INSERTION_MM, members_per_lumen, sigmas_of
-from pipeline.budget.shapes import DISTAL_MM
+from pipeline.budget.shapes import DISTAL_MM as SHAPED_MM
 from pipeline.budget.verdict import ROUND
-from pipeline.compare.metrics import rms, scored
+from pipeline.compare.metrics import DISTAL_MM, distal, rms, scored
 from pipeline.model import Array, arc_length
 from pipeline.run.stages.known import Context, Frame, Known
 from pipeline.run.stages.way import by_trace, way_of
@@ -47,8 +47,10 @@ FEW_ALONE = (
     f"budget.members_alone = {{}}: of fewer than {FEWEST} insertions nothing is said, so that the table by source has "
     f"no values; give {FEWEST} or more, or 0 for no such table"
 )
-DISTAL = 20
-"""Number of points at a wire's end that count as distal: at the usual step of 0.5 mm its last 10 mm."""
+END_MM = DISTAL_MM["distal10_rms_mm"]
+"""The wire's end in budget.csv, as in entries.csv beside it."""
+Along = tuple[Array, Array]
+"""Arc lengths (n,) of a wire, mm, and values there."""
 
 
 def budgeted(run: Context, known: Known) -> Known:
@@ -96,7 +98,7 @@ def _rare(rank: float) -> list[str]:
     if not rank <= RARE:
         return []
     return [
-        f"the traced wires' last {DISTAL_MM:g} mm, of all frames together, lie as far from the simulated ones as "
+        f"the traced wires' last {SHAPED_MM:g} mm, of all frames together, lie as far from the simulated ones as "
         f"1 in {1.0 / rank:.0f} of the budget's insertions (ends_rank): the model is wrong, or an input is "
         "less certain than stated; of right ones one case in twenty has this, too"
     ]
@@ -252,24 +254,30 @@ class Work:
         calm = [i for i, n in enumerate(self.numbers) if (b := found[n]) is not None and b.shapes is None]
         rows = [self._alone(source, ensemble, calm) for source, ensemble in each.items()]
         pairs = [(b, self.frames[i]) for i in calm if (b := found[self.numbers[i]]) is not None]
+        compared = [(b, f, f.comparison) for b, f in pairs if f.comparison is not None]
         ends = (
-            ("inputs", "all of these", [b.input_mm for b, _ in pairs]),
-            ("segments", "half of num_mm", [np.full(len(b.input_mm), ROUND * self._segments_mm(f)) for b, f in pairs]),
-            ("trace", self.trace_said or "its own", [ROUND * self.trace_mm(f) for _, f in pairs]),
-            ("u_val", "inputs, segments, trace", [b.whole_mm for b, _ in pairs if b.whole_mm is not None]),
-            ("error", "simulated to traced", [f.comparison.error_mm for _, f in pairs if f.comparison is not None]),
+            ("inputs", "all of these", [(b.arc_mm, b.input_mm) for b, _ in pairs]),
+            (
+                "segments",
+                "half of num_mm",
+                [(b.arc_mm, ROUND * self._segments_mm(f) + 0.0 * b.arc_mm) for b, f in pairs],
+            ),
+            ("trace", self.trace_said or "its own", [(b.arc_mm, ROUND * self.trace_mm(f)) for b, f, _ in compared]),
+            ("u_val", "inputs, segments, trace", [(b.arc_mm, b.whole_mm) for b, _ in pairs if b.whole_mm is not None]),
+            ("error", "simulated to traced", [(b.arc_mm, errors.error_mm) for b, _, errors in compared]),
         )
         return rows + [_row(name, said, values) for name, said, values in ends if calm]
 
     def _alone(self, source: str, ensemble: Sequence[Array], calm: Sequence[int]) -> dict[str, Any]:
         """The row of one input by its ensemble."""
         budgets = self.budgets_of(ensemble)
-        known = [b.input_mm for i in calm if (b := budgets[i]) is not None and np.isfinite(b.input_mm).all()]
+        pairs = [(b.arc_mm, b.input_mm) for i in calm if (b := budgets[i]) is not None]
+        known = [(arc, values) for arc, values in pairs if np.isfinite(values).all()]
         return _row(source, self.sigmas.said[source], known)
 
 
-def _row(name: str, said: str, values: Sequence[Array]) -> dict[str, Any]:
-    """A row of budget.csv from values of frames, each (n,) along the wire."""
-    step = [v[-DISTAL:] for v in values]
-    everything, distal = (np.concatenate([np.zeros(0), *part]) for part in (values, step))
-    return {"source": name, "sigma": said, "u_mm": rms(everything), "distal_u_mm": rms(distal)}
+def _row(name: str, said: str, frames: Sequence[Along]) -> dict[str, Any]:
+    """A row of budget.csv from values of frames along the wire."""
+    whole = [values for _, values in frames], [distal(values, arc, END_MM) for arc, values in frames]
+    every, ends = (rms(np.concatenate([np.zeros(0), *part])) for part in whole)
+    return {"source": name, "sigma": said, "u_mm": every, "distal_u_mm": ends}

@@ -17,7 +17,7 @@ from pipeline.run.stages.contradicted import contradicted, from_traces
 from pipeline.run.stages.entries import four_entries, replayed_entries
 from pipeline.run.stages.known import Context, Frame, Known
 from pipeline.run.stages.own_curves import rough
-from pipeline.run.stages.rivals import rival_ways, rival_wires, simulated_rivals
+from pipeline.run.stages.variants import simulated_rivals, variant_wires, variants_of
 from pipeline.run.stages.views import compare_in_views
 from pipeline.simulate.clamp import ahead_of
 from pipeline.status import FrameStatus
@@ -50,17 +50,17 @@ def compare_frames(run: Context, known: Known) -> Known:
 def _simulated_otherwise(
     run: Context, known: Known, clues: Clues
 ) -> tuple[list[list[Solution]], Mapping[int, Mapping[str, Array]]]:
-    """The wires from four entries (``entries``), and by frame those of the simulated predictors (``rivals``).
+    """The wires from four entries (``entries``), and by frame those of the simulated predictors (``variants``).
 
     While helpers simulate, this process finds what the clues of all frames share.
     """
-    ways = rival_ways(run, known)
+    ways = variants_of(run, known)
     told = run.case.simulated is None  # another simulator's wires say nothing about what this one is told
 
     def one(number: int, _earlier: object) -> Any:
         if not number:
             return replayed_entries(run, known)
-        wires = rival_wires(run, known, ways[number - 1])
+        wires = variant_wires(run, known, ways[number - 1])
         return wires, from_traces(known, wires, run.config.compare) if told else []
 
     entered, *others = run.share("compare", one, 1 + len(ways), clues.known_ways)

@@ -13,7 +13,7 @@ from pipeline.compare.config import CompareConfig
 from pipeline.compare.metrics import point_to_curve, scored
 from pipeline.model import Array
 from pipeline.run.stages.known import Context, Frame, Known
-from pipeline.run.stages.rivals import BENT, CATHETER, ROLL, TIP_CURVE, SimulatedVariant, Wires, simulated_frames
+from pipeline.run.stages.variants import BENT, CATHETER, ROLL, TIP_CURVE, SimulatedVariant, Wires, simulated_frames
 from pipeline.simulate.departures import turned
 
 FAR_NEARER = 0.7

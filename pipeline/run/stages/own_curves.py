@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.arrays.polyline import resample
+from pipeline.arrays.polyline import resample, turns_deg
 from pipeline.load.curves import read_curve
 from pipeline.model import Array, Curve, arc_length
 from pipeline.run.stages.known import Context, Frame
@@ -131,7 +131,7 @@ def zigzag(points_mm: Array) -> float:
         return 0.0
     coarse = resample(points_mm, CHORD_MM)
     steps = np.diff(coarse, axis=0)
-    turn = _turns(steps)
+    turn = np.radians(turns_deg(coarse, 1))
     # an arc that turns by t is longer than its chord by t^2 / 24
     arcs = float(np.linalg.norm(steps, axis=1).sum()) * (1.0 + float(np.mean(turn**2) if len(turn) else 0.0) / 24.0)
     return float(arc_length(points_mm)[-1]) / arcs - 1.0
@@ -141,12 +141,6 @@ def corner_mm(points_mm: Array) -> float:
     """The furthest that a line between two points (n, 3) passes beside an arc with the curve's turns at these, mm."""
     steps = np.diff(points_mm, axis=0)
     length = np.linalg.norm(steps, axis=1)
-    bend = _turns(steps) / (0.5 * (length[1:] + length[:-1]))
+    bend = np.radians(turns_deg(points_mm, 1)) / (0.5 * (length[1:] + length[:-1]))
     ends = np.concatenate([bend[:1], bend, bend[-1:]]) if len(bend) else np.zeros(2)
     return float(np.max(0.5 * (ends[1:] + ends[:-1]) * length**2 / 8.0))
-
-
-def _turns(steps: Array) -> Array:
-    """Angles (n - 1,), radians, between the steps (n, 3) of a curve."""
-    along = steps / np.linalg.norm(steps, axis=1)[:, None]
-    return np.asarray(np.arccos(np.clip(np.sum(along[1:] * along[:-1], axis=1), -1.0, 1.0)))

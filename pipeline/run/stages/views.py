@@ -15,7 +15,7 @@ from pipeline.compare.views import Screen, counted, nulls_in, pair_in, screen_of
 from pipeline.load.views import View
 from pipeline.model import Array
 from pipeline.run.stages.known import Context, Frame, Known
-from pipeline.run.stages.rivals import rival_ways, rival_wires, simulated_rivals
+from pipeline.run.stages.variants import simulated_rivals, variant_wires, variants_of
 from pipeline.simulate import wall_of
 from pipeline.status import FrameStatus
 from reports.case_files import counted as number_of
@@ -28,8 +28,8 @@ FAR_SHIFT_MM = 10.0
 def compare_in_views(run: Context, known: Known) -> tuple[Frame, ...]:
     """The frames with their errors on the planes of their views, beside those of predictors that are shifted alike."""
     clues, config = _clues(run, known), run.config.compare
-    ways = [] if clues is None else rival_ways(run, known)
-    wires = run.share("compare", lambda i, _: rival_wires(run, known, ways[i]), len(ways))
+    ways = [] if clues is None else variants_of(run, known)
+    wires = run.share("compare", lambda i, _: variant_wires(run, known, ways[i]), len(ways))
     simulated = simulated_rivals(run, known, ways, wires)
     seen = [PredictorInputs(simulated=simulated.get(frame.index, {})) for frame in known.frames]
     tolerance = run.config.trace.length_tolerance_mm

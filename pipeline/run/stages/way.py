@@ -57,14 +57,26 @@ def with_depths(frames: Sequence[Frame], source: str, clamp: Clamp) -> list[Fram
     apart = np.array([traced[f.index] - f.expected_mm for f in frames if f.index in traced and f.trusted_curve])
     apart = apart[np.isfinite(apart)]
     off = float(np.median(apart)) if len(apart) >= FEWEST else 0.0
-    return [_at(frame, traced.get(frame.index, frame.expected_mm + off)) for frame in frames]
+    return [
+        _at(f, traced[f.index], TRACED_BEHIND) if f.index in traced else _at(f, f.expected_mm + off, STATED_BEHIND)
+        for f in frames
+    ]
 
 
-def _at(frame: Frame, depth: float) -> Frame:
-    """The frame at a depth, mm; failed where that is NaN or behind the entry."""
+TRACED_BEHIND = (
+    "the traced wire ends {:.2f} mm behind the entry, where nothing can be pushed to; check that entry_direction "
+    "points the way the wire is pushed, and that entry_mm lies before its tip"
+)
+STATED_BEHIND = (
+    "nothing is traced, and its insertion_mm, counted as the traces show that the others' were, ends {:.2f} mm behind "
+    "the entry, where nothing can be pushed to; check insertion_mm"
+)
+
+
+def _at(frame: Frame, depth: float, behind: str) -> Frame:
+    """The frame at a depth, mm; failed where that is NaN or ``behind`` the entry."""
     if depth <= 0.0:
-        note = f"the traced wire ends {-depth:.2f} mm behind the entry, where nothing can be pushed to; "
-        note += "check that entry_direction points the way the wire is pushed, and that entry_mm lies before its tip"
+        note = behind.format(-depth)
         return replace(frame, depth_mm=float("nan")).failed("simulate", FrameStatus.SIMULATE_FAILED, note)
     found = replace(frame, depth_mm=depth)
     if not np.isnan(depth):

@@ -1,6 +1,8 @@
-"""Simulated predictors: the simulator without the roll, or without the tip's curve; they show what these are worth.
+"""The simulator with one thing otherwise than stated: two predictors, and wires that the traces may speak for.
 
-Both have everything else of the simulated wire, the clamp and the depths too. ``roll_unknown`` is the mean, at equal
+Without the roll, or without the tip's curve, it is a predictor, which shows what these are worth. With another curve of
+the tip, or without the stated catheter, its wires are held against the traces alone (``contradicted``). The predictors
+have everything else of the simulated wire, the clamp and the depths too. ``roll_unknown`` is the mean, at equal
 arc length, of twelve wires 30 degrees apart: of all guesses that with the least expected squared error.
 """
 
@@ -51,8 +53,8 @@ TIMES = 0.5, 2.0, 5.0
 """The curve of the tip, over the stated one, that may speak against it."""
 
 
-def rival_ways(run: Context, known: Known) -> list[SimulatedVariant]:
-    """How the rivals are simulated: with a straight tip, ROLLS turned ones, bent TIMES as much, without a catheter.
+def variants_of(run: Context, known: Known) -> list[SimulatedVariant]:
+    """What is simulated: with a straight tip, ROLLS turned ones, a tip bent TIMES as much, without a catheter.
 
     Empty where they are switched off or nothing was simulated. A wire that is straight at rest has no curve to leave
     out or to turn: both would be the simulated wire again, which no simulator beats.
@@ -91,8 +93,8 @@ def simulated_rivals(
     return found
 
 
-def rival_wires(run: Context, known: Known, way: SimulatedVariant) -> Wires:
-    """The wires under one of ``rival_ways``; none where the solver has no such wire, as of five times a sharp bend."""
+def variant_wires(run: Context, known: Known, way: SimulatedVariant) -> Wires:
+    """The wires under one of ``variants_of``; none where the solver has no such wire, as of five times a sharp bend."""
     case, lumen, clamp, frames = run.case, known.lumen, known.clamp, simulated_frames(known)
     assert lumen is not None
     assert clamp is not None
