@@ -70,6 +70,8 @@ class FrameArrays:
     error_mm, arc_mm : one value for each compared sample of the arc.     contact_force_N : (k,) or (k, 3) at the
     joints.
     median_mm (n, 3), covariance_mm2 (n, 3, 3) : of the ensemble's wires, at samples like those.
+    mips : the scan's maxima along array axis 0, 1, 2, in the box of the case's ``scan``.     straightened : the scan
+    along the traced wire.
     """
 
     frame: int
