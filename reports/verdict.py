@@ -82,7 +82,7 @@ def _beyond_inputs(statistics: Mapping[str, Any]) -> str:
 
 WORSE = "worse than a guess"
 NO_BETTER, NOT_SHOWN = "no better than a guess", "not shown to be better than a guess"
-TOO_FEW = "too few insertions to tell"
+TOO_FEW = "too few insertions to tell from a guess"
 TIPS_OFF, COPIED, TWINS = "the tips lie off", "made from the traces", "insertions look like one"
 NEVER_NEAREST = TIPS_OFF, COPIED
 """Why a simulator leads nowhere, whatever its distances to the traced wire."""
