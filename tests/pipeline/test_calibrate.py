@@ -314,6 +314,17 @@ def test_a_run_takes_the_parameters(study):
     assert "'a' was calibrated with and is not scored" in notes[0]
 
 
+def test_the_budget_is_told_how_well_what_was_seen_is_known(study):
+    rows = "".join(
+        f'[[estimate]]\nname = "{name}"\nvalue = 1.0\nsd = 0.1\nlogarithmic = true\nseen = {seen}\nused = 1.0\n'
+        for name, seen in (("rest_curvature", "true"), ("wall:7", "true"), ("friction", "false"), ("wall:2", "true"))
+    )
+    text = (study / "p.toml").read_text(encoding="utf-8")
+    (study / "p.toml").write_text(text.replace("[[estimate]]", f"{rows}[[estimate]]", 1), encoding="utf-8")
+    (case,), _ = as_calibrated(read_manifest(study / "manifest.toml").cases, study / "p.toml")
+    assert case.calibrated_sigma == {"rest_curvature": 0.1, "wall_stiffness": 0.1}, "its own wall; nothing of the taper"
+
+
 def test_a_friction_that_was_not_seen_stays_as_the_case_states_it(study):
     """A case stated at 0.3 ran with the 0.03 of those calibrated with, and the page said: as stated."""
     manifest, file = study / "manifest.toml", study / "p.toml"
