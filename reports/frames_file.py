@@ -61,7 +61,8 @@ class Straightened(NamedTuple):
 class FrameArrays:
     """Arrays of one frame; what does not apply is None.
 
-    traced_mm (n, 3), simulated_mm (k, 3), truth_mm (t, 3) : LPS mm, from the entry to the tip.
+    traced_mm (n, 3), simulated_mm (k, 3), truth_mm (t, 3) : LPS mm, from the entry to the tip. The trace may begin some
+    tenths of a mm before or beyond the clamp's plane, from which insertion_mm counts: its own length is another.
     trace_sigma_mm (n,) : standard deviation of the traced points.     trace_flags (n,) : 1 where a gap is bridged, the
     scan is streaky or strands are in contact, 2 where the wire is nearly parallel to the plane of rotation, 3 both, 0
     neither.
