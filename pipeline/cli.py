@@ -5,7 +5,7 @@ import importlib
 import re
 import signal
 import sys
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import NoReturn
 
@@ -115,16 +115,21 @@ def parsed(words: Sequence[str]) -> argparse.Namespace:
         raise _unknown(typed[0].partition("=")[0], verb, known) from None
     if unknown:
         allowed = verbs[args.command]._option_string_actions if args.command else parser._option_string_actions
-        raise _unknown(unknown[0], args.command, allowed)
+        raise _unknown(unknown[0], args.command, allowed, words)
     if not args.command and not args.version:
         parser.print_help()
     return args
 
 
-def _unknown(word: str, verb: str | None, allowed: Iterable[str]) -> InputError:
-    """What is said of a word that a verb does not know."""
+def _unknown(
+    word: str, verb: str | None, allowed: Mapping[str, argparse.Action], words: Sequence[str] = ()
+) -> InputError:
+    """What is said of a word that a verb does not know. words : all that was typed."""
     long = [name for name in allowed if name.startswith("--")]
     hint = did_you_mean(word, long) if word.startswith("-") else "one argument too many"
+    before = [one for one in words[: words.index(word)] if one.startswith("-")] if word in words else []
+    if before and isinstance(allowed.get(before[-1]), argparse._AppendAction) and not word.startswith("-"):
+        hint = f"{before[-1]} takes one value; repeat it: {before[-1]} {word}"
     return _usage(f"{word}: not an option of wireval {verb or ''}; {hint}".replace(" ;", ";"))
 
 

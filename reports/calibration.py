@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from reports._content import NOTHING, flatten, grid, number
+from reports._content import NOTHING, Grid, flatten, grid, number
 from reports.case_files import counted
 from reports.page import draw_sections, write_page
 from reports.records import read_json
@@ -34,6 +34,19 @@ COLUMNS = (
     Column("meaning", "-", "what it is", "text"),
 )
 
+WIRE = (
+    Column("of", "-", "a key of [wires.*] of the manifest", "text"),
+    Column("at_mm", "mm", "distance from the tip"),
+    Column("stated", "-", "what the manifest states, in the unit that the key ends with"),
+    Column("used", "-", "what parameters.toml holds"),
+    Column("sd", "-", "one standard deviation; held: the fit leaves it as stated", "text"),
+)
+RATIOS = (
+    "Shapes tell the ratios of stiffness alone: of the shaft to the tip, and of the wall to the wire. EI of the tip is "
+    "held as stated, and the shaft's is relative to it (absolute_stiffness = false in parameters.toml). If you know "
+    "the shaft's EI and not the tip's: multiply EI all along, and stiffness_N_mm2 of every wall, in parameters.toml "
+    "by your shaft's EI over the one here. That changes no shape."
+)
 PLANNED = (
     COLUMNS[0],
     Column("sd", "-", "one standard deviation as the planned study would find it; " + OF_FACTORS, "text"),
@@ -57,12 +70,22 @@ def render_calibration(out: Path) -> Path:
         "gained": gained(record["frames"]),
         "starts": [(number(roll), number(value)) for roll, value in record["starts"]],
         "estimates": grid(table, COLUMNS, bad=[not row["seen"] for row in rows], nothing=NOTHING),
+        "wire": _wire(record.get("wire", [])),
+        "ratios": RATIOS if record.get("absolute_stiffness") is False else "",
         "sections": draw_sections("calibration", record, out, embed=False),
         "warnings": record.get("warnings", ()),
         "notes": record["notes"],
         "provenance": list(flatten(record["provenance"])),
     }
     return write_page("calibration.html.j2", page, out / "calibration.html")
+
+
+def _wire(rows: Sequence[Mapping[str, Any]]) -> Grid | None:
+    """The wire's profiles as stated and as calibrated; None in a record that has none."""
+    if not rows:
+        return None
+    told = [{**row, "sd": _spread({**row, "logarithmic": True}, "sd") if row["sd"] > 0 else "held"} for row in rows]
+    return grid(pd.DataFrame(told), WIRE, nothing=NOTHING)
 
 
 def _of_the_traces(record: Mapping[str, Any]) -> str:
@@ -99,7 +122,7 @@ def _planned(row: dict[str, Any]) -> dict[str, Any]:
     return {"parameter": row["name"], "sd": spread, "enough": enough, "seen": seen, "meaning": row["what"]}
 
 
-def _spread(row: dict[str, Any], key: str) -> str:
+def _spread(row: Mapping[str, Any], key: str) -> str:
     """A standard deviation; that of a factor in percent, or from 30 % on as a factor itself."""
     sd = float(row[key])
     if row["logarithmic"]:

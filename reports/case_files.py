@@ -26,7 +26,10 @@ _MOST_NAMED = 5
 class CaseFiles:
     """What is on disk of one case; tables that are absent are empty, and an absent result.json is an empty mapping.
 
-    samples : the compared points, None where they were not read; ``points`` reads them.
+    folder : where it lies; ``view`` in it is for 3D Slicer and ParaView.     result : result.json: status, wire, wall,
+    entry (the clamp that was used), warnings, assumptions, settings.     errors : a row for each frame.     samples :
+    the compared points, None where they were not read; ``points`` reads them.     timings : seconds of each frame.
+    scan : where the vessel's crop lies.     frames : numbers of the frames that ``read_frame`` knows.
     """
 
     folder: Path

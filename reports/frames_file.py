@@ -61,7 +61,8 @@ class Straightened(NamedTuple):
 class FrameArrays:
     """Arrays of one frame; what does not apply is None.
 
-    traced_mm (n, 3), simulated_mm (k, 3), truth_mm (t, 3) : LPS mm, from the entry to the tip.
+    traced_mm (n, 3), simulated_mm (k, 3), truth_mm (t, 3) : LPS mm, from the entry to the tip. The trace may begin some
+    tenths of a mm before or beyond the clamp's plane, from which insertion_mm counts: its own length is another.
     trace_sigma_mm (n,) : standard deviation of the traced points.     trace_flags (n,) : 1 where a gap is bridged, the
     scan is streaky or strands are in contact, 2 where the wire is nearly parallel to the plane of rotation, 3 both, 0
     neither.
@@ -70,6 +71,8 @@ class FrameArrays:
     error_mm, arc_mm : one value for each compared sample of the arc.     contact_force_N : (k,) or (k, 3) at the
     joints.
     median_mm (n, 3), covariance_mm2 (n, 3, 3) : of the ensemble's wires, at samples like those.
+    mips : the scan's maxima along array axis 0, 1, 2, in the box of the case's ``scan``.     straightened : the scan
+    along the traced wire.
     """
 
     frame: int

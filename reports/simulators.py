@@ -21,6 +21,7 @@ from reports.verdict import NEVER_NEAREST, Doubt, badge, first_that_holds, tips_
 
 PAGE = "simulators.html"
 _MOST_WARNINGS, _MOST_REASONS = 5, 3
+_ENDS = ("low", "high")
 _MOST_SHARED = 0.75
 """Share of a simulator's frames up to which those that count for all of them are few."""
 
@@ -43,6 +44,7 @@ def render_simulators(out_dir: Path, embed: bool = False) -> Path:
     page = {
         "title": "Simulators side by side - wireval",
         "names": list(folders),
+        "nearer": nearer(files.simulators.to_dict("records"), off=_off(table, copied)),
         "first": next(iter(places)),
         "said": [
             {"name": name, "link": links[name]}
@@ -74,6 +76,7 @@ def _said(alone: Mapping[Any, Any], folder: Path, lines: Sequence[str], copied: 
     frames to be judged beside the others.
     """
     row = first_row(read_if_there(folder / OVERALL_FILE, SUMMARY))
+    alone_skill = row.get("skill_strongest"), row.get("strongest_frames")
     row |= {name: value for name, value in alone.items() if "strongest" in name or name in ("frames", "frames_ok")}
     if few:  # nor has it a skill against the centreline beside those of the others
         row.pop("skill", None)
@@ -86,7 +89,7 @@ def _said(alone: Mapping[Any, Any], folder: Path, lines: Sequence[str], copied: 
     said = verdict(row, alone["simulator"], doubt)
     lines = [line for line in lines if line != doubt.copied]
     said = said or mixed or not_reached(folder) or "No frame of it has a result." * (not good)
-    aside = f" Of the study {missing}." if missing else ""
+    aside = _without_others(*alone_skill, row) + f" Of the study {missing}." * bool(missing)
     more = counted(rest := len(lines) - _MOST_WARNINGS, "more warning")
     return {
         "badge": badge(status, status == "ok", row, doubt),
@@ -95,6 +98,14 @@ def _said(alone: Mapping[Any, Any], folder: Path, lines: Sequence[str], copied: 
         "failures": _failed(folder, alone["simulator"]) if failed else [],
         "warnings": [*lines[:_MOST_WARNINGS], *[f"{more} on the pages of its cases"] * (rest > 0)],
     }
+
+
+def _without_others(skill: Any, frames: Any, beside: Mapping[str, Any]) -> str:
+    """That its own pages tell another skill, over other frames; empty where these are the same, or not known."""
+    if pd.isna(frames) or pd.isna(skill) or frames == beside.get("strongest_frames"):
+        return ""
+    own = f"{_content.number(skill)}, over {counted(int(frames), 'frame')}"
+    return f" This skill is on the frames of all; the skill on its own pages is {own}."
 
 
 def _failed(folder: Path, name: str) -> list[str]:
@@ -139,10 +150,42 @@ def _one_table(rows: pd.DataFrame, copied: Container[str]) -> tuple[pd.DataFrame
     return table, columns
 
 
+def _off(table: pd.DataFrame, copied: Container[str]) -> set[str]:
+    """The simulators with tips that rms_mm does not see, or with wires made from the traces."""
+    rows = [dict(row) for _, row in table.iterrows()]
+    return {str(row["simulator"]) for row in rows if row["simulator"] in copied or tips_off(row)}
+
+
 def _doubtful(table: pd.DataFrame, copied: Container[str]) -> "pd.Series[bool]":
     """Whether a simulator has failed frames, tips that rms_mm does not see, or wires made from the traces."""
-    off = [row["simulator"] in copied or bool(tips_off(dict(row))) for _, row in table.iterrows()]
-    return table["frames_ok"].lt(table["frames"]) | pd.Series(off, table.index, dtype=bool)
+    return table["frames_ok"].lt(table["frames"]) | table["simulator"].isin(_off(table, copied))
+
+
+def nearer(rows: Sequence[Mapping[Any, Any]], off: Container[str] = ()) -> list[str]:
+    """Of the simulator with the least rms_mm how it stands to every other one, a sentence each.
+
+    One with failed frames, which rms_mm leaves out, is held against one without.
+    rows : of simulators.csv.     off : simulators that are left out, since rms_mm does not judge them.
+    """
+    own = [row for row in rows if pd.isna(row.get("against")) and row["simulator"] not in off and row["frames_ok"] > 0]
+    if not own:
+        return []
+    best = min(own, key=lambda row: (row["frames_ok"] < row["frames"], float(row["rms_mm"])))["simulator"]
+    others = {row["simulator"] for row in own}
+    return [_beside(row) for row in rows if row.get("against") == best and row["simulator"] in others]
+
+
+def _beside(row: Mapping[Any, Any]) -> str:
+    """Whether the simulator of a row is farther from the traced wires than that of ``against``."""
+    one, other, value = row["simulator"], row["against"], float(row["rms_ratio"])
+    low, high = (
+        float("nan") if pd.isna(row.get(f"rms_ratio_{end}")) else float(row[f"rms_ratio_{end}"]) for end in _ENDS
+    )
+    head = f"{other} is nearer than {one}" if low > 1.0 else f"{one} is nearer than {other}" if high < 1.0 else ""
+    head = head or f"{other} is not shown to be nearer than {one}"
+    known = f"95 % interval {low:.2f} to {high:.2f}; {row['interval']}" if low <= high else str(row["interval"])
+    where = counted(int(row["common_frames"]), "frame")
+    return f"{head}: on {where} {one} lies {value:.2f} times as far from the traced wires ({known.rstrip('; ')})."
 
 
 def in_common(rows: pd.DataFrame) -> str:

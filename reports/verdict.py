@@ -38,7 +38,8 @@ def verdict(statistics: Mapping[str, Any], simulator: str = "", doubt: Doubt = N
     whose = f"he wire of {simulator}" if simulator else "he simulated wire"
     some = _of_frames(statistics)
     sentence = f"{f'On {some} alone t' if some else 'T'}{whose} lies {rms} mm (rms) from the traced one"
-    sentence += f", 95 % interval {ends} mm" if ends else ""
+    few = _over_few(statistics)
+    sentence += f", 95 % interval {ends} mm" + f" (wide: {few})" * bool(few) if ends else ""
     tail = number(statistics.get("p95_mm"))
     sentence += f"; 95 % of its points lie within {tail} mm." if tail != NOTHING else "."
     true = number(statistics.get("truth_rms_mm"))
@@ -82,7 +83,7 @@ def _beyond_inputs(statistics: Mapping[str, Any]) -> str:
 
 WORSE = "worse than a guess"
 NO_BETTER, NOT_SHOWN = "no better than a guess", "not shown to be better than a guess"
-TOO_FEW = "too few insertions to tell"
+TOO_FEW = "too few insertions to tell from a guess"
 TIPS_OFF, COPIED, TWINS = "the tips lie off", "made from the traces", "insertions look like one"
 NEVER_NEAREST = TIPS_OFF, COPIED
 """Why a simulator leads nowhere, whatever its distances to the traced wire."""
@@ -245,10 +246,14 @@ _WEAKER = (
 
 def _few_insertions(statistics: Mapping[str, Any]) -> str:
     """Whose doing it is that an interval over few insertions is wide: not the wire's alone."""
+    few = _over_few(statistics)
+    return f"Intervals over {few} are wide: a perfect wire may have such a one; scan more." * bool(few)
+
+
+def _over_few(statistics: Mapping[str, Any]) -> str:
+    """Over how many insertions intervals are, where that makes them wide; else empty."""
     told = str(statistics.get("interval")).partition("; ")[0]
-    if not told.startswith(_WIDE):
-        return ""
-    return f"Intervals over {told.removeprefix(_WIDE)} are wide: a perfect wire may have such a one; scan more."
+    return told.removeprefix(_WIDE) if told.startswith(_WIDE) else ""
 
 
 def of_these_alone(statistics: Mapping[str, Any]) -> str:

@@ -18,8 +18,8 @@ from solver.grid import Grid, read_only
 
 OFFSET_MM = Range(-FAR_MM, FAR_MM, "a tenth of a voxel is usual")
 MAKE_A_DISTANCE = (
-    "a mask of the lumen is made one by scipy.ndimage: "
-    "distance_transform_edt(~mask, spacing_mm) - distance_transform_edt(mask, spacing_mm)"
+    "a mask of the lumen is made one by scipy.ndimage: gaussian_filter("
+    "distance_transform_edt(~mask, spacing_mm) - distance_transform_edt(mask, spacing_mm), 1)"
 )
 SLICES = 16
 FLAT, STEEP = 0.5, 1.75

@@ -91,12 +91,15 @@ def sigmas_of(
     depth_mm: Array,
     voxel_mm: float,
     noise_mm: float | None = None,
+    calibrated: Mapping[str, float] | None = None,
 ) -> Sigmas:
-    """The standard deviations of a case: what is stated, else the defaults.
+    """The standard deviations of a case: what is stated, else what a calibration found, else the defaults.
 
     stated : keys of ``Uncertainty``, and roll_deg.     depth_mm : (stops,) of the depths.     noise_mm : of the
-    lumen's surface by the scan's noise.
+    lumen's surface by the scan's noise.     calibrated : by the same keys; of roll_deg that of the common
+    offset, which adds to how far each insertion is turned by mistake.
     """
+    found = calibrated or {}
     noise = LUMEN_NOISE_VOXELS * voxel_mm if noise_mm is None else noise_mm
     friction = nominal.config.friction or 0.0
     defaults = {
@@ -110,11 +113,9 @@ def sigmas_of(
     }
     values, said = {}, {}
     for name, default in defaults.items():
-        given, source = stated.get(name), _source(name)
-        values[source] = default if given is None else given
-        said[source] = (
-            f"{values[source]:.3g}{UNITS.get(name, ' (relative)')}, {'default' if given is None else 'stated'}"
-        )
+        source = _source(name)
+        values[source], told = _known(stated.get(name), found.get(name), default, both=name == "roll_deg")
+        said[source] = f"{values[source]:.3g}{UNITS.get(name, ' (relative)')}, {told}"
     clamp = nominal.clamp
     known = clamp.covariance is not None
     said["clamp"] = f"{clamp.sigma_mm:.3f} mm across and {clamp.sigma_deg:.2f} degrees" if known else "exact"
@@ -122,6 +123,14 @@ def sigmas_of(
     said["depth"] = " and ".join(f"{float(np.median(some)):.2f} mm, {kind}" for kind, some in kinds if len(some))
     covariance = np.array(clamp.covariance) if known else np.zeros((6, 6))
     return Sigmas(covariance, depth_mm, **values, said=said)
+
+
+def _known(stated: float | None, calibrated: float | None, default: float, *, both: bool) -> tuple[float, str]:
+    """The standard deviation of an input, and whence it is. both : what a calibration found adds to the rest."""
+    own, told = (default, "default") if stated is None else (stated, "stated")
+    if calibrated is None or not (both or stated is None):
+        return own, told
+    return (float(np.hypot(own, calibrated)), f"{told} and calibrated") if both else (calibrated, "calibrated")
 
 
 def _source(name: str) -> str:

@@ -105,6 +105,26 @@ def bent(wire: Wire, values: Mapping[str, float]) -> Wire:
     return replace(wire, bending_stiffness_N_mm2=changed, rest_curvature_per_mm=curved)
 
 
+def lacking(wire: Wire) -> dict[str, tuple[str, str]]:
+    """Parameters that the wire as stated does not have, so that no scan tells them: each with why, and what to state.
+
+    They are factors on what is stated, and a straight wire lies the same at every roll.
+    """
+    found = {}
+    stiffness = np.array(wire.bending_stiffness_N_mm2, dtype=float)
+    if stiffness.ndim == 0 or stiffness[0, 1] == stiffness[-1, 1]:
+        why = "the wire is stated as stiff at its tip as at its shaft: no scan tells a factor between them"
+        found[TAPER] = why, "state bending_stiffness_N_mm2 as [distance from the tip, EI] pairs that rise to the shaft"
+    curvature = np.array(wire.rest_curvature_per_mm, dtype=float)
+    if not np.any(curvature if curvature.ndim == 0 else curvature[:, 1]):
+        why, do = (
+            "the wire is stated straight: no scan tells",
+            "state rest_curvature_per_mm if the real tip is curved",
+        )
+        found |= {ROLL: (f"{why} at which roll it lies", do), REST: (f"{why} a factor on its curve", do)}
+    return found
+
+
 def wall_factor(stated_N_mm2: float, values: Mapping[str, float]) -> float:
     """Factor on a wall's stiffness: its factor relative to the wire, times the wire's own factor."""
     return float(np.exp(values.get(f"{WALL}:{stated_N_mm2:g}", 0.0) + values.get(BENDING, 0.0)))

@@ -96,6 +96,6 @@ def _design(args: argparse.Namespace, cases: "tuple[Case, ...]", config: "Config
         verdict = "seen" if row.seen else "not seen"
         sd, enough = (spread_in_words(s, logarithmic=row.unknown.logarithmic) for s in (row.sd, row.unknown.enough))
         say(f"{row.unknown.name:20s} +- {sd:8s}  ({enough} or less counts as seen)  {verdict}")
-    write_design(args.out / "design.json", rows, notes)
+    write_design(args.out / "design.json", cases[0].wire, rows, notes)
     say(f"page: {render_design(args.out)}")
     return 0

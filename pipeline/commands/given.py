@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pipeline.commands import resolved_settings, say
-from reports.texts import status_of
+from reports.texts import TEXT_BYTES, status_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -73,6 +73,8 @@ def given(args: argparse.Namespace, keep: Path | None = None) -> "Manifest":
         if unused := _said_of_scans(args):
             raise InputError([f"{', '.join(unused)}: of a folder of scans; {path} is a manifest, which says it itself"])
         return read_manifest(path)
+    if named := [file for file in sorted(path.glob("*.toml")) if _is_manifest(file)]:
+        raise InputError([f"{path}: no {NAME} in it, and {named[0].name} is a manifest; give that file: {named[0]}"])
     text, seen, _ = inferred(args)
     seen = (*_other_manifests(path), *seen)
     if not getattr(args, "quiet", False):  # not every verb has it
@@ -83,6 +85,11 @@ def given(args: argparse.Namespace, keep: Path | None = None) -> "Manifest":
     written = keep / INFERRED
     write_text(written, text)
     return read_manifest(written)
+
+
+def _is_manifest(file: Path) -> bool:
+    """Whether a TOML file states cases: one that was inferred from the scans beside it would be judged instead."""
+    return b"[[case]]" in file.read_bytes()[:TEXT_BYTES]
 
 
 def _other_manifests(folder: Path) -> list[str]:

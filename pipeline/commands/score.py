@@ -160,7 +160,9 @@ def _plans(args: argparse.Namespace) -> "dict[str, Plan]":
         place = names.get(name)
         cases = _with_wires(calibrated, place, args)
         out = args.out / "simulators" / name if plans else args.out
-        how = {"fresh": args.fresh, "embed": args.embed, "quiet": args.quiet, "simulator": name}
+        # of all but the first, lumen and traces are taken again: their steps would be printed once a simulator
+        quiet = args.quiet or bool(plans and place)
+        how = {"fresh": args.fresh, "embed": args.embed, "quiet": quiet, "simulator": name}
         template = Job(cases[0], settings, out, cache=default_root(), **how)
         plans[name] = Plan(manifest, cases, template, workers=args.jobs, assumptions=notes)
     if not args.fresh:

@@ -154,8 +154,22 @@ def require_same_geometry(reference: Header, other: Header, name: str = "") -> N
     raise LoadError(
         f"geometry differs between scans of one case: {found}.\n"
         f"  {describe(reference)}\n  {name + ' of ' if name else ''}{describe(other)}\n"
+        f"{_lost(reference, other)}"
         "  Bring them onto one grid: sitk.Resample(scan, other) of SimpleITK, or Resample Image (BRAINS) of 3D Slicer, "
         "brings a scan onto the grid of another one."
+    )
+
+
+def _lost(one: Header, other: Header) -> str:
+    """What to do where only the place of two scans differs, and a header does not state it: resampled, all is lost."""
+    if one.shape != other.shape or not np.allclose(one.spacing_mm, other.spacing_mm, rtol=1e-3):
+        return ""
+    at_zero = [header for header in (one, other) if header.assumed or not header.origin_mm.any()]
+    if len(at_zero) != 1:
+        return ""
+    return (
+        f"  {at_zero[0].source} lies at the origin, as where a conversion lost the place: if both were scanned in one "
+        "place, copy the other's header onto it (CopyInformation of SimpleITK); else:\n"
     )
 
 

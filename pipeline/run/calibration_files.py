@@ -1,6 +1,7 @@
 """The files of a calibration: parameters.toml for runs, calibration.json for its page, design.json for a plan."""
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -8,8 +9,10 @@ import numpy as np
 
 from pipeline.calibrate.design import Predicted
 from pipeline.calibrate.estimates import Calibration, Estimate
-from pipeline.calibrate.unknowns import BENDING, FRICTION, REST, ROLL, TAPER, WALL, bent, wall_factor
+from pipeline.calibrate.unknowns import BENDING, FRICTION, REST, ROLL, TAPER, WALL, bent, lacking, wall_factor
+from pipeline.model import Wire
 from pipeline.run.calibrated import data_of
+from pipeline.run.calibrated_wire import wire_rows
 from pipeline.run.calibration import Gathered, depth_offset
 from pipeline.run.provenance import code_state
 from pipeline.run.results import jsonable, write_json
@@ -31,9 +34,16 @@ ADVICE = {
 """What to measure so that a parameter is seen, by its name."""
 
 
+def _advice(name: str, wire: Wire) -> str:
+    """What to measure so that a parameter is seen, or what to state where the wire as stated does not have it."""
+    none = lacking(wire)
+    return none[name][1] if name in none else ADVICE[name.split(":")[0]]
+
+
 def estimates_of(found: Gathered, fit: Calibration) -> list[dict[str, Any]]:
     """Rows of all parameters, the depth offset among them."""
-    rows = [_row(e) for e in fit.estimates]
+    none = lacking(found.cases[0].wire)
+    rows = [_row(e) | ({"why": none[e.unknown.name][0]} if e.unknown.name in none else {}) for e in fit.estimates]
     off = float(np.mean([_too_flat(voxels) for voxels in _thickness(found).values()] or [0.0]))
     rows = [row | {"sd": float(np.hypot(row["sd"], off))} if row["name"] == REST else row for row in rows]
     value, sd = depth_offset(found, fit)
@@ -56,7 +66,6 @@ def write_parameters(path: Path, found: Gathered, fit: Calibration) -> Parameter
     rows, values, first = estimates_of(found, fit), fit.values, found.cases[0]
     wire, by_name = bent(first.wire, values), {row["name"]: row for row in rows}
     walls = sorted({case.wall.stiffness_N_mm2 for case in found.cases})
-    scaled = BENDING in by_name and by_name[BENDING]["seen"]
     lines = [
         "# written by wireval calibrate; taken by `parameters` in a case or by --parameters FILE",
         "schema = 1",
@@ -66,7 +75,7 @@ def write_parameters(path: Path, found: Gathered, fit: Calibration) -> Parameter
         f"friction = {_text(values[FRICTION])}",
         f"roll_offset_deg = {_text(values[ROLL])}",
         f"depth_offset_mm = {_text(by_name[DEPTH]['used'])}",
-        f"absolute_stiffness = {json.dumps(scaled)}",
+        f"absolute_stiffness = {json.dumps(_weighed(by_name))}",
     ]
     lines += ["", "[stated]", f"bending_stiffness_N_mm2 = {_text(first.wire.bending_stiffness_N_mm2)}"]
     lines.append(f"rest_curvature_per_mm = {_text(first.wire.rest_curvature_per_mm)}")
@@ -80,6 +89,11 @@ def write_parameters(path: Path, found: Gathered, fit: Calibration) -> Parameter
         lines += ["traced_mm = [", *(f"  {_text(points.round(4).tolist())}," for points in traces), "]"]
     write_text(path, "\n".join(lines) + "\n")
     return read_parameters(path)
+
+
+def _weighed(rows: Mapping[str, Mapping[str, Any]]) -> bool:
+    """Whether stiffness is known in N mm2, by forces or the weight, and not in its ratios alone."""
+    return bool(rows.get(BENDING, {}).get("seen"))
 
 
 def _text(value: Any) -> str:
@@ -142,6 +156,7 @@ def write_record(path: Path, found: Gathered, fit: Calibration) -> None:
     names = [e.unknown.name for e in fit.estimates]
     profiles = {e.unknown.name: [[e.unknown.shown(v), rise] for v, rise in e.profile] for e in fit.estimates}
     about = {e.unknown.name: e.unknown for e in fit.estimates}
+    first, by_name = found.cases[0], {row["name"]: row for row in rows}
     for row in rows:
         unknown = about.get(row["name"])
         row["what"] = unknown.what if unknown else "mm added to stated depths"
@@ -149,9 +164,11 @@ def write_record(path: Path, found: Gathered, fit: Calibration) -> None:
         row["prior_sd"] = unknown.sd if unknown else 5.0
         row["bounds"] = [unknown.shown(unknown.low), unknown.shown(unknown.high)] if unknown else []
         row["enough"] = unknown.enough if unknown else DEPTH_ENOUGH_MM
-        row["advice"] = "" if row["seen"] else ADVICE[row["name"].split(":")[0]]
+        row["advice"] = "" if row["seen"] else _advice(row["name"], first.wire)
     record = {
         "estimates": rows,
+        "wire": wire_rows(first.wire, fit, by_name[REST]),
+        "absolute_stiffness": _weighed(by_name),
         "correlation": {"names": names, "values": fit.correlation},
         "profiles": profiles,
         "frames": [vars(frame) for frame in fit.frames],
@@ -166,11 +183,11 @@ def write_record(path: Path, found: Gathered, fit: Calibration) -> None:
     write_json(path, {"schema": 1, **record})
 
 
-def write_design(path: Path, rows: list[Predicted], notes: tuple[str, ...]) -> None:
-    """Write design.json: the predicted standard deviations of a planned study."""
+def write_design(path: Path, wire: Wire, rows: list[Predicted], notes: tuple[str, ...]) -> None:
+    """Write design.json: the predicted standard deviations of a planned study with this wire."""
     found = [
         {"name": (u := p.unknown).name, "sd": p.sd, "enough": u.enough, "seen": p.seen, "logarithmic": u.logarithmic}
-        | {"what": u.what, "advice": "" if p.seen else ADVICE[u.name.split(":")[0]]}
+        | {"what": u.what, "advice": "" if p.seen else _advice(u.name, wire)}
         for p in rows
     ]
     write_json(path, jsonable({"schema": 1, "predicted": found, "notes": notes, "provenance": code_state()}))

@@ -51,7 +51,8 @@ ANY = Inputs({})
 
 UNSTATED = {
     *("reference", "frames", "lumen", "traces", "truth", "projections", "simulated", "parameters", "entry_case"),
-    *("calibrated", "calibrated_scans", "calibrated_traces", "own_parameters", "as_stated", "assumed"),
+    *("calibrated", "calibrated_sigma", "calibrated_scans", "calibrated_traces"),
+    *("own_parameters", "as_stated", "assumed"),
 }
 """Keys that name files, whose contents count, and what is no statement of the manifest."""
 OF_FILES = ("reference", "frames", "lumen", "traces")

@@ -23,7 +23,7 @@ from reports.doubts import copied_from_traces, warnings_in
 from reports.origin import why_not_pooled
 from reports.run_page import render_index
 from reports.schema import FAILURES, OURS, POINTS, SIMULATORS, WHERE
-from reports.simulators import in_common, render_simulators
+from reports.simulators import in_common, nearer, render_simulators
 from reports.verdict import COPIED, TIPS_OFF, tips_off
 
 STEPS_MM = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
@@ -66,6 +66,7 @@ def write_comparison(out: Path, folders: Mapping[str, Path]) -> list[str]:
             if other == OURS:
                 said = both.sentence.replace("the second run / the first", f"{one} / {OURS}")
                 sentences.append("; ".join([said, *caveat]))
+    sentences += nearer([row for row in rows if OURS not in (row["simulator"], row.get("against"))], off)
     tables.write(out / SIMULATORS.file, SIMULATORS, rows)
     tables.write(out / WHERE.file, WHERE, [] if mixed else list(_where(folders, judged, common, off)))
     sentences += _twins(studies)

@@ -55,16 +55,30 @@ def left_out(curves: Mapping[int, Curve], out: Sequence[int], used: int) -> str:
     what = f"the first {REACH_MM:g} mm of the traces of frame{'s' * (len(out) != 1)} {', '.join(map(str, out))}"
     if len(out) < used:
         apart = _apart_mm([curve for n, curve in curves.items() if n not in out], [curves[n] for n in out])
-        first = "these traces" if apart > FROM_OTHERS_MM else "the wire's tip, stiffness, roll and friction"
         return (
             f"the simulated wire, held as the other {used} frames show, does not fit {what}: left out of the clamp. "
-            f"Traced, they lie within {apart:.2f} mm of the others: look at {first} first"
+            f"Traced, they lie within {apart:.2f} mm of the others: look at {_first(curves, out, apart)}"
         )
     return (
         f"the simulated wire fits {what} from no clamp that also fits the other {used}: left out of it; check entry_mm "
         "first (beyond the real clamp a wire moves from frame to frame: an entry that is stated some mm too deep fits "
         "none of them together), then roll, material_axis and the wire's tip and stiffness, before the traces"
     )
+
+
+def _first(curves: Mapping[int, Curve], out: Sequence[int], apart_mm: float) -> str:
+    """What to look at first. apart_mm : how far the traces that were left out lie from the others.
+
+    The least deep frames have the wire's tip nearest to the fitted length, where the others have its shaft: a tip that
+    is stated straight, or turned, puts them apart without anything wrong with a trace.
+    """
+    if apart_mm <= FROM_OTHERS_MM:
+        return "the wire's tip, stiffness, roll and friction first"
+    if max(curves[n].length_mm for n in out) < min(curve.length_mm for n, curve in curves.items() if n not in out):
+        return (
+            "the wire's tip first (curve, roll, stiffness), since these frames are the least deep, then at these traces"
+        )
+    return "these traces first, then at the wire's tip, stiffness and roll"
 
 
 def _apart_mm(others: Sequence[Curve], curves: Sequence[Curve]) -> float:

@@ -18,6 +18,7 @@ from pipeline.load.order import in_order
 from pipeline.load.slices import is_dicom, is_multiframe
 from pipeline.model import Array, Volume, Wall
 from pipeline.study.same_grid import apart
+from reports.case_files import listed
 
 NO_REFERENCE = "reference: none found (a file named reference.*); --reference names a scan without the wire"
 REFERENCE_NAMES = ("reference", "ref", "wire_free", "nowire", "empty")
@@ -244,7 +245,7 @@ def infer_manifest(
         hint = _loose(folder) or _items(folder) or _deeper(folder) or _packed(folder)
         raise unusable(folder, f"found {found}; allowed: {allowed}{hint}")
     seen = (
-        f"frames: {len(frames)} scans in natural order, {frames[0].name} to {frames[-1].name}",
+        f"frames: {len(frames)} scans in natural order, {_order([path.name for path in frames])}",
         f"reference: {reference.name}" if reference else NO_REFERENCE,
         *(f"left out: {path.name}, named as a scan without wire" for path in left_out),
     )
@@ -263,6 +264,13 @@ def infer_manifest(
         wall=Wall(),
     )
     return text, seen, tuple(notes)
+
+
+def _order(names: Sequence[str]) -> str:
+    """The first and the last name; where the order is not that of a folder's listing, the first few one by one."""
+    if [*names] == sorted(names):
+        return f"{names[0]} to {names[-1]}"
+    return f"which is not the alphabetical one: {listed(names)}"
 
 
 def _assumed(radius_mm: float | None, places: Sequence[str]) -> list[str]:

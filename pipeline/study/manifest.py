@@ -86,6 +86,7 @@ class Case(Strict):
     traces: Sources = ()
     parameters: PathText | None = None
     calibrated: Annotated[str, *FILLED_IN] = ""
+    calibrated_sigma: Annotated[dict[str, float], *FILLED_IN] = Field(default_factory=dict)
     as_stated: Annotated[str, *FILLED_IN] = ""
     own_parameters: Annotated[str, *FILLED_IN] = ""
     calibrated_kin: Annotated[str, *FILLED_IN] = ""

@@ -136,6 +136,7 @@ def with_parameters(case: "Case", found: Parameters, data: Sequence[str], *, sco
         "wire": replace(case.wire, **profiles),
         "wall": replace(case.wall, stiffness_N_mm2=stiffness or case.wall.stiffness_N_mm2, friction=friction),
         "calibrated": _told(case, found, known_wall=stiffness is not None),
+        "calibrated_sigma": _sigmas(case, found),
         "calibrated_scans": () if score_used else tuple(scan for used in found.used for scan in used.data),
         "calibrated_traces": () if score_used else tuple(trace for used in found.used for trace in used.traced_mm),
     }
@@ -160,6 +161,17 @@ def with_parameters(case: "Case", found: Parameters, data: Sequence[str], *, sco
 def sharing(found: Parameters, data: Sequence[str]) -> str:
     """Which calibrated case has a frame or a trace with these in common; empty where none has."""
     return next((one.case for one in found.used if set(one.data) & set(data)), "")
+
+
+def _sigmas(case: "Case", found: Parameters) -> dict[str, float]:
+    """Standard deviations of what the calibration saw, for the budget, by its keys.
+
+    The taper is not among them: it is a factor on the shaft's stiffness there, on lengths in the budget.
+    """
+    keys = {name: name for name in ("rest_curvature", "friction")} | {"depth_offset_mm": "insertion_mm"}
+    keys |= {f"wall:{case.wall.stiffness_N_mm2:g}": "wall_stiffness"}
+    keys |= {"roll_offset_deg": "roll_deg"} if case.roll_deg != "fit" else {}
+    return {keys[one.name]: one.sd for one in found.estimate if one.seen and one.name in keys}
 
 
 def _told(case: "Case", found: Parameters, *, known_wall: bool) -> str:

@@ -5,6 +5,10 @@
     wireval.check("study/manifest.toml")                          # [] where nothing is wrong
     results = wireval.run("study/manifest.toml", "out", jobs=2)
     results.errors.plot(x="insertion_mm", y="rms_mm")
+    worst = results.errors.nlargest(1, "p95_mm").iloc[0]          # the tutorial draws it
+    case = results.cases[worst.case]                              # CaseFiles: .result, .errors, .scan, .folder, ...
+    case.read_frame(worst.frame).curves                           # FrameArrays: the wires; .mips, .error_mm, ...
+    wireval.wall_of(case)                                         # the lumen of this case, for the solver alone
 
 ``synth``, ``check``, ``run``, ``score``, ``calibrate`` and ``diff`` do what the commands of these names do; all other
 commands (report, bench, ...) exist on the command line alone. Everything else here is defined in other packages and can
@@ -24,20 +28,27 @@ from . import _own_packages  # noqa: F401 - first: it says what is in the way of
 from pipeline.cli import BAD_INPUT, carried_out, parsed
 from pipeline.compare import point_to_curve
 from pipeline.run.compared import compared
+from pipeline.run.provenance import package_version
 from pipeline.status import InputError, StageError
+from reports.case_files import CaseFiles
+from reports.frames_file import FrameArrays, ScanCrop
 from reports.two_runs import Verdict
 from solver import Catheter, Grid, GuideWire, Insertion, Insertions, Snap, Solution, Status, VesselWall, relax
 
-from .results import Results, read_results, read_run
+from .results import Results, read_results, read_run, wall_of
 
+__version__ = package_version()
 __all__ = [
+    "CaseFiles",
     "Catheter",
+    "FrameArrays",
     "Grid",
     "GuideWire",
     "InputError",
     "Insertion",
     "Insertions",
     "Results",
+    "ScanCrop",
     "Snap",
     "Solution",
     "StageError",
@@ -53,6 +64,7 @@ __all__ = [
     "run",
     "score",
     "synth",
+    "wall_of",
 ]
 
 

@@ -49,9 +49,11 @@ def who_is_nearest(files: SimulatorFiles) -> Drawing | None:
     for (axes, strip), (along, rows) in zip(panels.T, where.groupby("along", sort=False), strict=False):
         for number, (name, mine) in enumerate(rows.groupby("simulator", sort=False)):
             middle, rms = unbroken(mine)
-            # gaps at other places in each show the line below where two lie on each other
-            style = "osD^v"[number // 4 % 5] + ("-", "--", "-.", ":")[number % 4]
-            axes.plot(middle, rms, style, color=shown[str(name)], label=str(name), markersize=4)
+            # where lines lie on each other the wider ones below are seen beside those above, and in their gaps
+            below = 1.0 - number / max(len(shown) - 1, 1)
+            look = {"markersize": 3.5 + 4.0 * below, "linewidth": 1.3 + 2.2 * below}
+            style = "osD^v"[number % 5] + ("-", "--", "-.", ":")[number % 4]
+            axes.plot(middle, rms, style, color=shown[str(name)], label=str(name), **look)
         plain(axes)
         _nearest(strip, rows, shown)
         strip.set_xlabel(f"{along}, mm")

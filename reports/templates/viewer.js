@@ -263,7 +263,8 @@
   const sizesOf = (f) => Object.values(f.offsets).flat();
   // what of the wire the strips show: all of it, or around the place when zoomed
   const seen = (f, width) => {
-    const whole = Math.max(reach(f), ...sizesOf(f).map((o) => o[0])) || 1, length = whole / zoom(), cursor = place();
+    // places count along the simulated wire, which may be the longer: its last one is seen, too
+    const whole = Math.max(reach(f), wireOf(f).arc[wireOf(f).arc.length - 1], ...sizesOf(f).map((o) => o[0])) || 1, length = whole / zoom(), cursor = place();
     const from = clamp((cursor ? cursor.s : 0) - length / 2, 0, whole - length), px = (width - LEFT - RIGHT) / length;
     return { from, length, px, X: (s) => LEFT + (s - from) * px };
   };
@@ -282,8 +283,9 @@
       pen.save(); pen.beginPath(); pen.rect(LEFT, Y(most), width - LEFT - RIGHT, 2 * most * high); pen.clip();
       if (image) {
         const { along_mm, across_mm, samples } = f.straight, half = 0.5 * samples[1] * across_mm;
-        pen.fillStyle = "#000000"; pen.fillRect(0, 0, width, height);
-        pen.drawImage(image, X(-0.5 * along_mm), Y(half), samples[0] * along_mm * px, 2 * half * high);
+        const span = [X(-0.5 * along_mm), samples[0] * along_mm * px]; // beyond it nothing was sampled, which is not black
+        pen.fillStyle = "#000000"; pen.fillRect(span[0], 0, span[1], height);
+        pen.drawImage(image, span[0], Y(half), span[1], 2 * half * high);
       }
       if (shown("traced")) {
         pen.fillStyle = COLOUR.traced; pen.globalAlpha = 0.3;

@@ -177,6 +177,7 @@ def lengths() -> Numbers:
             for frames in found
         ),
         shrinking=(" ".join(depths.shrinking(frames, 0.3)) for frames in found),
+        drawn_back=(" ".join(depths.drawn_back(frames, 0.3)) for frames in found),
         standing=(" ".join(depths.standing(frames, 0.3)) for frames in found),
         rough=(" ".join(own_curves.rough({3: curve}, 0.3, "the traces", "export more")) for curve in rough),
         tips=(own_curves.known_by_tip(curve) for curve in rough),

@@ -148,6 +148,17 @@ def test_members_have_the_segments_of_the_simulated_wire_where_longer_ones_lie_e
     assert np.abs(apart).max() > 0.003, "mm"
 
 
+def test_what_a_calibration_found_is_drawn_where_nothing_is_stated() -> None:
+    """A rest curvature known to 2 % was drawn with the default of 5 %, without a word."""
+    calibrated = {"rest_curvature": 0.02, "roll_deg": 3.0, "friction": 0.01}
+    known = sigmas_of({"friction": 0.05}, nominal(), WIRE, np.full(2, 0.1), 0.3, calibrated=calibrated)
+    assert (known.rest_curvature, known.said["rest_curvature"]) == (0.02, "0.02 (relative), calibrated")
+    assert known.roll == pytest.approx(np.hypot(ROLL_DEG, 3.0)), "its own error, and that of the common offset"
+    assert known.said["roll"].endswith("degrees, default and calibrated")
+    assert (known.friction, known.said["friction"]) == (0.05, "0.05, stated")
+    assert known.said["taper"].endswith("default")
+
+
 def test_a_noisy_scan_has_a_lumen_that_is_less_known() -> None:
     start = nominal()
     quiet, noisy = (sigmas_of({}, start, WIRE, np.full(2, 0.1), 0.2, noise_mm=mm).lumen for mm in (0.0, 0.04))

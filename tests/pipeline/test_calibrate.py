@@ -20,13 +20,14 @@ from pipeline.calibrate.fit import Problem
 from pipeline.calibrate.residuals import Evidence, weights_of
 from pipeline.calibrate.search import own_roll
 from pipeline.calibrate.trials import OWN, Point, Trial, replayed
-from pipeline.calibrate.unknowns import BENDING, FRICTION, REST, ROLL, TAPER, bent, spread_in_words, unknowns
+from pipeline.calibrate.unknowns import BENDING, FRICTION, REST, ROLL, TAPER, bent, lacking, spread_in_words, unknowns
 from pipeline.cli import main
 from pipeline.compare.pooled import is_pooled
 from pipeline.model import Clamp, Curve, Lumen, Wall, Wire
 from pipeline.run import calibration_files, inputs
 from pipeline.run.cache import Store
 from pipeline.run.calibrated import as_calibrated, data_of
+from pipeline.run.calibrated_wire import wire_rows
 from pipeline.run.calibration import gathered, over_insertions
 from pipeline.run.calibration_files import estimates_of, flattened, misfit
 from pipeline.run.inputs import described, other_file, stated, times_of
@@ -130,6 +131,34 @@ def test_a_straight_uniform_wire_shows_no_roll_and_no_taper():
     unseen = {e.unknown.name for e in fit.estimates if not e.seen}
     assert {ROLL, REST, TAPER} <= unseen
     assert all(fit.values[name] == 0.0 for name in (ROLL, REST, TAPER))
+
+
+def test_a_wire_is_told_what_it_is_stated_without():
+    """To see the taper of a wire of one stiffness, "deeper insertions" were recommended."""
+    assert lacking(WIRE) == {}
+    even = replace(WIRE, bending_stiffness_N_mm2=[(0.0, 2.0), (30.0, 2.0)])
+    assert list(lacking(even)) == list(lacking(replace(even, bending_stiffness_N_mm2=2.0))) == [TAPER]
+    for straight in (0.0, [(0.0, 0.0), (8.0, 0.0)]):
+        assert list(lacking(replace(WIRE, rest_curvature_per_mm=straight))) == [ROLL, REST]
+
+
+def test_the_wire_is_told_along_its_length_with_its_deviation():
+    """The page had factors alone: EI of the shaft, and that the tip's was held, had to be computed by hand."""
+    free = {u.name: u for u in unknowns([], 0.0, weighed=True)}
+    linear = SimpleNamespace(covariance=np.diag([0.1, 0.3]) ** 2)
+    fit: Any = SimpleNamespace(values={TAPER: np.log(1.5), BENDING: 0.0})
+    fit.fit = SimpleNamespace(problem=SimpleNamespace(free=[free[TAPER]]), linear=linear)
+    rows = wire_rows(WIRE, fit, {"sd": 0.02, "seen": True})
+    assert [row["at_mm"] for row in rows] == [0.0, 10.0, 30.0, 0.0, 8.0, 8.0]
+    assert [row["used"] for row in rows] == pytest.approx([0.5, 0.5, 3.0, 0.1, 0.1, 0.0])
+    assert [row["sd"] for row in rows] == pytest.approx([0.0, 0.0, 0.1, 0.02, 0.02, 0.0]), "the tip is held"
+    fit.fit.problem.free.append(free[BENDING])
+    weighed = wire_rows(replace(WIRE, bending_stiffness_N_mm2=2.0), fit, {"sd": 0.02, "seen": False})
+    assert [row["sd"] for row in weighed] == pytest.approx([0.3, 0.0, 0.0, 0.0])
+    assert weighed[0]["at_mm"] is None
+    assert [row["sd"] for row in wire_rows(WIRE, fit, {"sd": 0.0, "seen": False})][2] == pytest.approx(
+        np.hypot(0.1, 0.3)
+    )
 
 
 def test_derivatives_are_those_of_whole_insertions():
@@ -284,6 +313,17 @@ def test_a_run_takes_the_parameters(study):
     assert "taper" in case.calibrated
     assert "no wall stated at 7 N/mm2" in case.calibrated
     assert "'a' was calibrated with and is not scored" in notes[0]
+
+
+def test_the_budget_is_told_how_well_what_was_seen_is_known(study):
+    rows = "".join(
+        f'[[estimate]]\nname = "{name}"\nvalue = 1.0\nsd = 0.1\nlogarithmic = true\nseen = {seen}\nused = 1.0\n'
+        for name, seen in (("rest_curvature", "true"), ("wall:7", "true"), ("friction", "false"), ("wall:2", "true"))
+    )
+    text = (study / "p.toml").read_text(encoding="utf-8")
+    (study / "p.toml").write_text(text.replace("[[estimate]]", f"{rows}[[estimate]]", 1), encoding="utf-8")
+    (case,), _ = as_calibrated(read_manifest(study / "manifest.toml").cases, study / "p.toml")
+    assert case.calibrated_sigma == {"rest_curvature": 0.1, "wall_stiffness": 0.1}, "its own wall; nothing of the taper"
 
 
 def test_a_friction_that_was_not_seen_stays_as_the_case_states_it(study):
@@ -455,6 +495,13 @@ def test_the_verb_writes_what_it_reads(study, capsys):
     assert "parameters seen" in quiet[-1]
     page = (study / "out" / "calibration.html").read_text(encoding="utf-8")
     assert "not seen" in page
+    for text in (said, page):
+        assert "the wire is stated as stiff at its tip as at its shaft" in text, (
+            "it was to be seen by deeper insertions"
+        )
+        assert "stated straight: no scan tells at which roll it lies" in text
+    assert 'id="wire"' in page
+    assert "Shapes tell the ratios of stiffness alone" in page, "absolute_stiffness = false was explained nowhere"
     lines = (study / "out" / "figures" / "profiles.csv").read_text(encoding="utf-8").splitlines()
     assert max(Counter(line.split(",")[0] for line in lines).values()) >= 8, "a curve, not a tent"
 
@@ -466,7 +513,7 @@ def test_a_planned_study_has_a_page(study, capsys):
     assert "20 % or less counts as seen" in said
     page = (study / "plan" / "design.html").read_text(encoding="utf-8")
     assert "a: 3 frames, voxels of" in page
-    assert "a tip with a curve, seen free of the wall" in page, "what would show the roll of a straight wire"
+    assert "state rest_curvature_per_mm if the real tip" in page, "no frame shows the roll of a straight wire"
 
 
 def test_a_fitted_roll_costs_the_frame_it_was_fitted_on(study):
@@ -526,7 +573,7 @@ def test_a_wire_that_is_thin_in_its_voxels_is_warned_of():
 
 def of_voxels(voxel_mm, **case) -> Any:
     """What a fit has of one case whose wire has a radius of 0.18 mm."""
-    one = SimpleNamespace(**({"id": "a", "frames": ("scan",), "traces": ()} | case))
+    one = SimpleNamespace(**({"id": "a", "frames": ("scan",), "traces": (), "wire": WIRE} | case))
     trials = [SimpleNamespace(wire=SimpleNamespace(radius_mm=0.18), voxel_mm=voxel_mm)]
     return SimpleNamespace(cases=[one], trials=trials)
 

@@ -58,6 +58,10 @@ TOO_LONG = (
         ("runn x -o y", "did you mean 'run'?"),
         ("run x -o y --resme", "did you mean '--resume'?"),
         ("cache --info x", "one argument too many"),
+        (
+            "run m.toml -o out --only a b c",
+            "b: not an option of wireval run; --only takes one value; repeat it: --only b",
+        ),
         ("check STUDY/reference.mha", "a scan is no manifest; give its folder"),
         ("run STUDY/reference.mha -o y", "wireval init"),
         ("run STUDY -o STUDY/reference.mha", "this is a file; name a folder"),
@@ -788,9 +792,12 @@ def test_check_sees_an_entry_direction_that_is_turned_round(study: Path, capsys:
     assert len(heard.out.splitlines()) == 1, "-q prints the result alone"
 
 
-def test_a_folder_that_holds_another_manifest_says_so(tmp_path: Path) -> None:
+def test_a_folder_that_holds_another_manifest_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """One was inferred from the scans beside good.toml, and judged instead."""
     assert _other_manifests(tmp_path) == []
     (tmp_path / "good.toml").touch()
     (said,) = _other_manifests(tmp_path)
     assert "though it holds good.toml: name the file instead of the folder" in said
+    (tmp_path / "good.toml").write_text("schema = 1\n[[case]]\n", encoding="utf-8")
+    assert main(["check", str(tmp_path)]) == 2, "a single scan beside it was one case, in which no problem was found"
+    assert f"good.toml is a manifest; give that file: {tmp_path / 'good.toml'}" in capsys.readouterr().err

@@ -10,6 +10,7 @@ import pytest
 from pipeline.model import Curve
 from pipeline.run.log import Log
 from pipeline.run.stages.depths import (
+    drawn_back,
     in_another_order,
     in_step,
     on_another_scale,
@@ -152,6 +153,20 @@ def test_a_wire_that_gets_shorter_unsaid_is_a_warning() -> None:
     assert "frame 2 (-3.0 mm): the traced wire is shorter" in shrinking(frames([10.0, 14.0, 11.0], nan), 0.3)[0]
     assert shrinking(frames([10.0, 14.0, 13.9], nan), 0.3) == []
     assert shrinking(frames([10.0, 14.0, 11.0], [10.0, 14.0, 11.0]), 0.3) == []
+
+
+def test_frames_that_are_exchanged_by_less_than_any_tolerance_are_a_warning() -> None:
+    """Half a millimetre apart and exchanged in pairs, as d25, d25.5 once were read, all was ok without a word."""
+    stated = [25.0 + 0.5 * n for n in range(8)]
+    traced = [stated[n ^ 1] + 0.3 for n in range(8)]
+    assert [f.status for f in in_step(frames(traced, stated), 0.5)] == ["ok"] * 8
+    (said,) = drawn_back(frames(traced, stated), 0.7)
+    assert said.startswith("frames 1 (-0.50 mm, stated +0.50 mm), 3 (")
+    assert "are frames and insertion_mm in one order?" in said
+    assert drawn_back(frames(stated, stated), 0.5) == []
+    assert drawn_back(frames([*stated[:3], 25.9, *stated[4:]], stated), 0.5) == [], "one of seven, by chance"
+    assert drawn_back(frames([20.0, 10.0], [20.0, 10.0]), 0.5) == [], "pulled back as stated"
+    assert drawn_back(frames([20.0, 10.0], [float("nan")] * 2), 0.5) == []
 
 
 def dim(lengths: list[float], from_tip: list[float]) -> list[Frame]:

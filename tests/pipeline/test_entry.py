@@ -248,6 +248,10 @@ def test_traces_are_not_blamed_where_most_of_them_fit_no_clamp() -> None:
     points = seen[3].points_mm
     turned = Curve(points + 0.02 * np.arange(len(points))[:, None], np.zeros(len(points)))
     assert "mm of the others: look at these traces first" in left_out({**seen, 3: turned}, [3], 5)
+    short = Curve(turned.points_mm[: len(points) // 3], np.zeros(len(points) // 3))
+    assert "look at the wire's tip first (curve, roll, stiffness), since these" in left_out(
+        {**seen, 3: short}, [3], 5
+    ), "the trace of the least deep frame was blamed where the wire was stated straight, or turned by 30 degrees"
     most = left_out(seen, [0, 1, 2, 3], 2)
     assert "disagree" not in most
     assert "frames 0, 1, 2, 3" in most

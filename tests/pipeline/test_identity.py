@@ -20,7 +20,7 @@ from pipeline.load.order import in_order
 from pipeline.model import Volume
 from pipeline.run.hashing import file_hash
 from pipeline.run.store import digest
-from pipeline.study.infer import AT_EDGE, IN_PLACE, _deeper, _scans_in, infer_entry, infer_manifest
+from pipeline.study.infer import AT_EDGE, IN_PLACE, _deeper, _order, _scans_in, infer_entry, infer_manifest
 from pipeline.study.manifest import ManifestError, read_manifest
 from tests.pipeline.test_load import SPACING, image_of, numbered
 from tests.pipeline.test_manifest import GOOD
@@ -298,3 +298,9 @@ def test_a_reference_on_another_grid_is_told_before_it_is_subtracted(
     with pytest.raises(LoadError, match=f"geometry differs between scans of one case: .*{said}"):
         infer_manifest(tmp_path, None, None, None, LoadConfig())
     assert main(["init", str(tmp_path)]) == 2
+
+
+def test_an_order_that_no_listing_shows_is_told_name_by_name() -> None:
+    """Only the first and the last name were: d25, d25.5 could be read in any order between them."""
+    assert _order(["d25.mha", "d26.mha"]) == "d25.mha to d26.mha"
+    assert _order(["d9.mha", "d10.mha"]) == "which is not the alphabetical one: d9.mha, d10.mha"

@@ -91,6 +91,17 @@ def test_an_origin_that_is_off_by_whole_voxels_is_no_crop() -> None:
     assert "voxels apart, allowed 0.5" in apart(scans)[0]
 
 
+def test_an_origin_that_a_conversion_lost_is_to_be_copied() -> None:
+    """To resample such a scan onto the reference's grid was advised, which moves it out of the picture."""
+    reference = crop("reference.mha", (0, 0, 0), (20, 20, 20))
+    lost = crop("0.mha", (0, 0, 0), (20, 20, 20), origin_mm=np.zeros(3))
+    (told,) = apart([reference, lost])
+    assert "0.mha lies at the origin, as where a conversion lost the place" in told
+    assert told.index("CopyInformation") < told.index("sitk.Resample")
+    moved = crop("0.mha", (5, 0, 0), (20, 20, 20))
+    assert "CopyInformation" not in apart([reference, moved])[0]
+
+
 def test_a_crop_holds_the_voxels_that_its_file_has_there(tmp_path: Path) -> None:
     grey = np.arange(12 * 10 * 8, dtype=np.int16).reshape(8, 10, 12)  # z, y, x
     whole = sitk.GetImageFromArray(grey)

@@ -18,8 +18,8 @@ import pytest
 from numpy.typing import NDArray
 
 from pipeline.arrays.polyline import resample
-from pipeline.cli import main
-from pipeline.commands.score import said_once
+from pipeline.cli import main, parsed
+from pipeline.commands.score import _plans, said_once
 from pipeline.load.geometry import LoadError, Source
 from pipeline.load.vtk import read_vtk_points
 from pipeline.load.wires import numbered_frames, read_wires
@@ -584,6 +584,13 @@ def test_a_score_of_others_is_not_replaced(known: Known, tmp_path: Path, capsys:
     write_csv(one, [wire + [0.0, 0.01, 0.0] for wire in known[1]])
     assert main([*words, "--curves", str(one), "--curves", str(two)]) == 0, "the same wires, mended"
     assert main([*words, "--curves", f"one={two}", "--curves", f"two={one}", "--fresh"]) == 0
+
+
+def test_the_steps_of_a_case_are_printed_once_and_not_once_a_simulator(known: Known, tmp_path: Path) -> None:
+    """Of seven simulators the lines of all traces, which are taken again, came seven times."""
+    curves = [f"--curves={name}={write_csv(tmp_path / name, known[1])}" for name in ("one", "two")]
+    plans = _plans(parsed(["score", str(known[0]), "-o", str(tmp_path / "out"), *curves]))
+    assert {name: plan.template.quiet for name, plan in plans.items()} == {"one": False, "two": True, "wireval": False}
 
 
 @pytest.mark.parametrize("names", [("sofa", "SOFA"), ("Wireval",)])

@@ -21,7 +21,7 @@ from reports.case_page import render_case
 from reports.doubts import AMONG, COUNT_AS, MADE_FROM_TRACES
 from reports.run_page import render_index
 from reports.schema import ERRORS, FAILURES, POINTS, SIMULATORS, SUMMARY, WHERE
-from reports.simulators import _where, in_common, render_simulators
+from reports.simulators import _where, in_common, nearer, render_simulators
 from reports.verdict import Doubt, verdict
 
 pytestmark = pytest.mark.usefixtures("invented")
@@ -101,6 +101,36 @@ def test_every_pair_on_the_frames_that_count_in_both(compared: Path) -> None:
     assert list(alone["frames"]) == [24, 24, 24], "planned ones, whatever failed"
     assert alone.loc["worse", "frames_ok"] == 21
     assert alone.loc["worse", "within_1mm"] == pytest.approx(21 / 24)
+
+
+def test_who_is_nearer_is_said_for_the_best_and_every_other_one(compared: Path) -> None:
+    """Beside each stood "too few insertions to tell", meant of a guess; of two others no ratio was said."""
+    rows = tables.read(compared / "simulators.csv", SIMULATORS)
+    said = nearer(rows.to_dict("records"))
+    best, *_ = said[0].split()
+    assert len(said) == 2
+    assert f"{best} is nearer than worse: on 21 frames worse lies " in "".join(said)
+    assert f"<li>{said[0]}</li>" in render_simulators(compared).read_text(encoding="utf-8")
+    assert nearer(rows.to_dict("records"), off={"tip", "worse"}) == []
+    folders = {name: compared / name for name in ("tip", "worse", "wireval")}
+    printed = write_comparison(compared, folders)
+    assert any(line.startswith("tip is nearer than worse: ") for line in printed), "not on the terminal"
+    row = {"simulator": "b", "against": "a", "rms_ratio": 1.2, "common_frames": 1, "interval": "withheld"}
+    alone = [{"simulator": n, "frames": 1, "frames_ok": 1, "rms_mm": mm} for n, mm in (("a", 1.0), ("b", 1.2))]
+    told = "a is not shown to be nearer than b: on 1 frame b lies 1.20 times as far from the traced wires (withheld)."
+    assert nearer([*alone, row]) == [told]
+
+
+def test_a_skill_over_other_frames_than_on_its_own_pages_is_told_apart(tmp_path: Path) -> None:
+    """One simulator had two skills, over 8 and over 6 frames, by the same name."""
+    lost = tuple((case, 1) for case in range(CASES))
+    folders = {"one": write_tree(tmp_path, even(0.2))}
+    folders["half"] = write_tree(tmp_path / "simulators" / "half", even(0.3), failed=lost)
+    write_comparison(tmp_path, folders)
+    own = {"rms_mm": 0.2, "skill_strongest": 0.9, "strongest_null": "centreline", "strongest_frames": 24}
+    tables.write(tmp_path / "overall.csv", SUMMARY, [own])
+    page = render_simulators(tmp_path).read_text(encoding="utf-8")
+    assert "This skill is on the frames of all; the skill on its own pages is 0.900, over 24 frames." in page
 
 
 def test_skill_is_over_the_same_frames_for_all(tmp_path: Path) -> None:

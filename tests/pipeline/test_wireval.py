@@ -9,10 +9,13 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import wireval
 from pipeline.cli import main
+from pipeline.run.provenance import package_version
+from reports.case_files import read_case
 from reports.sweep import UNCHANGED
 from tests.pipeline.known_study import run_known, write_csv
 
@@ -31,6 +34,7 @@ def test_everything_that_is_promised_is_there_and_says_what_it_is() -> None:
 
 def test_what_a_notebook_completes_is_what_is_promised() -> None:
     """json, sys, Path, BAD_INPUT, parsed and carried_out stood among the names."""
+    assert wireval.__version__ == package_version() != ""
     assert [name for name in dir(wireval) if not name.startswith("__")] == sorted(wireval.__all__)
 
 
@@ -91,6 +95,7 @@ def test_a_run_gives_frames(study: Path, tmp_path: Path) -> None:
     assert re.fullmatch(r"\{'straight': CaseFiles\('.*/straight', ok, 2 frames\)\}", repr(results.cases))
     assert re.match(r"FrameArrays\(frame 1, traced_mm \(\d+, 3\), ", repr(results.cases["straight"].read_frame(1)))
     assert wireval.read_results(tmp_path / "out").errors.equals(results.errors)
+    assert replayed_mm(results.cases["straight"]) < 0.08, "0.1 voxel; there was no way from a run to its wall"
     table = tmp_path / "out" / "cases" / "straight" / "errors.csv"
     table.write_text(table.read_text(encoding="utf-8").replace("0.1", "0.01"), encoding="utf-8")
     with pytest.warns(UserWarning, match="errors.csv is not as it was written"):
@@ -135,6 +140,26 @@ def test_a_run_gives_frames(study: Path, tmp_path: Path) -> None:
     open_again = wireval.run(study, tmp_path / "out", resume=True, **kept)
     assert open_again.ok
     assert not (tmp_path / "out" / "gates.json").exists()
+
+
+def replayed_mm(case: wireval.CaseFiles) -> float:
+    """How far the solver alone lays the wire in the case's wall from where the run laid it, rms of the worst frame."""
+    held, stated, rows = case.result["entry"], case.result["wire"], case.errors
+    names = ("radius_mm", "bending_stiffness_N_mm2", "rest_curvature_per_mm")
+    wire = wireval.GuideWire(segment_mm=2.0, **{name: stated[name] for name in names})
+    clamp = {"entry_mm": held["used_mm"], "entry_direction": held["used_direction"]}
+    insertion = wireval.Insertion(wire, wireval.wall_of(case), **clamp, material_axis=held["material_axis"])
+    wires = insertion.to_depths(rows["insertion_mm"].to_numpy(), roll_deg=rows["roll_deg"].to_numpy())
+    off = [
+        wireval.point_to_curve(wire.joints_mm, case.read_frame(number).simulated_mm)[0]
+        for number, wire in zip(rows["frame"], wires, strict=True)
+    ]
+    return max(float(np.sqrt(np.mean(one**2))) for one in off)
+
+
+def test_a_case_without_a_lumen_has_no_wall(tmp_path: Path) -> None:
+    with pytest.raises(wireval.InputError, match=r"lumen\.vtp"):
+        wireval.wall_of(read_case(tmp_path))
 
 
 def test_verbs_are_called_as_they_are_typed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

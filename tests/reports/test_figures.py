@@ -22,7 +22,7 @@ from reports.figures import RunFiles, _drawing, _planes, declared, figures_of
 from reports.figures._drawing import LEAST_MM, Drawing, FrameAxis, positive_axis
 from reports.figures._style import STAGE_COLOURS, lines, predictors
 from reports.figures.along_wire import _CLIP_PERCENTILE
-from reports.figures.simulators import _nearest, unbroken
+from reports.figures.simulators import SimulatorFiles, _nearest, unbroken, who_is_nearest
 from reports.figures.simulators import colours as colours_of
 from reports.frames_file import FrameArrays, ScanCrop, Straightened, frame_numbers, read_frame, read_scan, write_frames
 from reports.page import draw_sections
@@ -321,6 +321,23 @@ def test_a_strip_without_a_nearest_says_so() -> None:
         _nearest(axes, where.assign(lead=[lead, None]), {"a": "red", "b": "blue"})
         assert len(axes.texts) == words
         assert len(axes.patches) == 1 - words
+
+
+def test_lines_of_simulators_that_coincide_are_all_seen() -> None:
+    """Of two the same one alone was seen where their gaps fell together, and marks hid each other."""
+    rows = [
+        {"along": along, "simulator": name, "low_mm": low, "high_mm": low + 5.0, "rms_mm": 0.1, "lead": None}
+        for along in ("distance from the tip", "insertion depth")
+        for name in ("a", "b", "c")
+        for low in (0.0, 5.0)
+    ]
+    drawing = who_is_nearest(SimulatorFiles(pd.DataFrame(), pd.DataFrame(rows)))
+    assert drawing is not None
+    lines = drawing.figure.axes[0].lines
+    assert len({line.get_marker() for line in lines}) == 3
+    for looks in (line.get_linewidth() for line in lines), (line.get_markersize() for line in lines):
+        widths = list(looks)
+        assert widths == sorted(set(widths), reverse=True), "each is narrower than the one that it lies on"
 
 
 def test_u_val_has_one_colour(tmp_path: Path) -> None:

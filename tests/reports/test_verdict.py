@@ -122,7 +122,7 @@ def test_a_wide_interval_of_few_insertions_is_no_fault_of_the_wire() -> None:
     """Over three insertions skills of 0.97 and 0.34 had one badge, not shown to be better than a guess."""
     row = {"skill_strongest": 0.97, "skill_strongest_low": -0.1, "strongest_null": "previous"}
     told = row | {"interval": "wide: 3 insertions"}
-    assert badge("ok", True, told) == {"text": "too few insertions to tell", "look": "poor"}
+    assert badge("ok", True, told) == {"text": "too few insertions to tell from a guess", "look": "poor"}
     assert badge("ok", True, told | {"skill_strongest": -0.1})["text"] == "no better than a guess"
     assert badge("ok", True, row)["text"] == "not shown to be better than a guess"
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import re
 import sys
+import warnings
 from collections.abc import Callable
 from typing import Any
 
@@ -12,9 +13,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy import ndimage
 
 import solver
 from solver import Catheter, Grid, GuideWire, Insertion, Insertions, VesselWall, doors, relax, skips, warm_up
+from solver.wall import MAKE_A_DISTANCE
 from tests.solver.scenes import tube_grid
 
 WIRE = GuideWire(1.0, 0.18, 10.0)
@@ -392,6 +395,21 @@ def test_an_undefined_frame_behind_the_doors_is_not_called_converged_either(
 ) -> None:
     monkeypatch.setattr(sys.modules["solver.relax"], "base_frame", lambda *_: np.full((3, 3), np.nan))
     assert relaxed(method=method).status is solver.Status.NON_FINITE
+
+
+def test_what_is_recommended_for_a_mask_is_a_distance() -> None:
+    """The formula without a filter jumped by two voxels across the wall: it was warned of, and 0.7 mm off in places."""
+    spacing_mm = [0.5] * 3
+    x, y, z = np.meshgrid(*(np.arange(-low, low, 0.5) + 0.07 for low in (4.0, 4.0, 8.0)), indexing="ij")
+    names = {name: getattr(ndimage, name) for name in ("distance_transform_edt", "gaussian_filter")}
+    recommended = eval(MAKE_A_DISTANCE.partition(": ")[2], names | {"mask": np.hypot(x - 0.3 * z, y) < 2.0} | locals())
+    with warnings.catch_warnings(action="error"):
+        made = VesselWall(Grid(recommended, spacing_mm, [-3.93, -3.93, -7.93]), 1.0)
+    angle, along = np.meshgrid(np.arange(0.0, 6.2, 0.3), np.arange(-4.0, 4.0, 0.37))
+    across = np.stack([2.0 * np.cos(angle) + 0.3 * along, 2.0 * np.sin(angle), along], axis=-1).reshape(-1, 3)
+    off_mm = made.look_up(across)[0]
+    assert np.abs(off_mm).max() < 0.3, "0.6 of a voxel; 1.4 without the filter"
+    assert off_mm.std() < 0.08, "0.23 without the filter"
 
 
 @pytest.mark.parametrize(

@@ -143,7 +143,8 @@ class Work:
         self.nominal = Nominal(known.held, depth, roll, replace(config.simulate, friction=friction), traced)
         stated = {"roll_deg": case.roll_sigma_deg, **asdict(case.uncertainty)}
         noise = known.vessel.levels.get("wall_noise_mm")
-        self.sigmas = sigmas_of(stated, self.nominal, case.wire, self._depth_sigmas(stops), self.voxel, noise)
+        known_to = self._depth_sigmas(stops), self.voxel, noise, case.calibrated_sigma
+        self.sigmas = sigmas_of(stated, self.nominal, case.wire, *known_to)
         self.seen = [self._seen(frame) for frame in frames]
         wires = [frame.simulated.joints_mm for frame in stops if frame.simulated is not None]
         traces = [frame.curve.points_mm for frame in frames if frame.curve is not None and frame.traced]
@@ -171,10 +172,10 @@ class Work:
 
     def _depth_sigmas(self, stops: Sequence[Frame]) -> Array:
         """Standard deviation (stops,) of the depth of each frame on the way, mm."""
-        given = self.run.case.insertion_sigma_mm
+        given, offset = self.run.case.insertion_sigma_mm, self.run.case.calibrated_sigma.get("insertion_mm", 0.0)
         tips = [0.0 if f.curve is None else np.nan_to_num(f.curve.tip_sigma_mm) for f in stops]
         own = np.hypot(tips, TIP_VOXELS * self.voxel)
-        return np.where(self.nominal.traced, own, INSERTION_MM if given is None else given)
+        return np.where(self.nominal.traced, own, np.hypot(INSERTION_MM if given is None else given, offset))
 
     def _seen(self, frame: Frame) -> FrameSample:
         """A frame's wires at the points at which it was compared."""

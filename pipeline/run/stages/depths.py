@@ -9,14 +9,15 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.special import stdtrit
+from scipy.special import bdtrc, ndtr, stdtrit
 
 from pipeline.arrays.grids import spread
 from pipeline.model import Array, Clamp
 from pipeline.run.stages.known import Frame
-from pipeline.simulate.clamp import depth_from
+from pipeline.simulate.clamp import TIP_VOXELS, depth_from
 from pipeline.status import FrameStatus
 from pipeline.trace import hardly_begun
+from reports.case_files import listed
 
 AROUND = 5
 """Number of neighbouring frames whose median difference of traced length and stated depth is the usual one."""
@@ -30,8 +31,10 @@ SURE_TIP = 4.0
 """Second limit: so many standard deviations of the frame's own tip."""
 LEAST_VOXELS = 3.0
 """Third limit, voxels: a length is out of step beyond all three. Also the least shrinking that gets a warning."""
+APART = 2.0
+"""Standard deviations of two tips from which their distance is not the stated one: by chance one step in 44."""
 LEAST_SCALE, CHANCE = 0.01, 1e-3
-"""By how much a scale must be off to be told, and how often a right one may seem as far off to that side."""
+"""By how much a scale must be off to be told, and how often right depths may seem as wrong."""
 
 
 def in_step(frames: Sequence[Frame], voxel_mm: float) -> list[Frame]:
@@ -187,6 +190,27 @@ def shrinking(frames: Sequence[Frame], voxel_mm: float) -> list[str]:
         f"frame{'s' * (len(odd) > 1)} {', '.join(odd)}: the traced wire is shorter than in the frame before, allowed "
         "where it was pulled back; are the frames in order? Else look at the picture whether the trace is cut short, "
         "or state insertion_mm"
+    ]
+
+
+def drawn_back(frames: Sequence[Frame], voxel_mm: float) -> list[str]:
+    """A warning where traced wires get shorter though stated depths grow, more often than by the errors of tips.
+
+    Frames half a millimetre apart that are exchanged in pairs are off by less than any tolerance of one frame.
+    """
+    seen = [(f, c) for f in frames if (c := f.trusted_curve) is not None and np.isfinite(f.expected_mm)]
+    odd, count = [], 0
+    for (earlier, before), (later, after) in pairwise(seen):
+        stated, traced = later.expected_mm - earlier.expected_mm, after.length_mm - before.length_mm
+        count += stated > 0.0
+        tips = np.hypot(np.nan_to_num([before.tip_sigma_mm, after.tip_sigma_mm]), TIP_VOXELS * voxel_mm)
+        if traced < 0.0 < stated and stated - traced > APART * np.hypot(*tips):
+            odd.append(f"{later.index} ({traced:+.2f} mm, stated {stated:+.2f} mm)")
+    if not odd or bdtrc(len(odd) - 1, count, ndtr(-APART)) > CHANCE:
+        return []
+    return [
+        f"frames {listed(odd)}: the traced wire is shorter than in the frame before, where insertion_mm is deeper: are "
+        "frames and insertion_mm in one order? Else look at the pictures whether traces are cut short"
     ]
 
 

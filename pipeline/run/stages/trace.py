@@ -21,6 +21,7 @@ from pipeline.run.stages.before import NOTHING, Before
 from pipeline.run.stages.beside import beside_what_is_seen, elsewhere
 from pipeline.run.stages.brightness import of_another_brightness
 from pipeline.run.stages.depths import (
+    drawn_back,
     in_another_order,
     in_step,
     on_another_scale,
@@ -97,6 +98,7 @@ def _in_step(run: Context, frames: list[Frame], voxel_mm: float) -> list[Frame]:
     run.log.warnings += [] if swapped else on_another_scale(frames, depths_mm)
     frames = in_step(to_depth(frames, depths_mm, tolerance_mm), voxel_mm)
     run.log.warnings += [*shrinking(frames, voxel_mm), *standing(frames, voxel_mm)]
+    run.log.warnings += [] if swapped else drawn_back(frames, voxel_mm)
     if run.case.traces:
         own = {index: curve.points_mm for index, curve in trusted(frames).items()}
         run.log.warnings += rough(own, voxel_mm, "the manifest's own curves", RESAMPLE)
