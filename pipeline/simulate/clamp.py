@@ -38,6 +38,7 @@ TIP_VOXELS = 0.25
 """What a traced tip may be off along the wire beyond its own standard deviation. It matters where rest curvature ends
 near the entry: 0.3 mm deeper turns such a wire by 2.6 degrees."""
 TANGENT_MM = 0.25
+"""How far to both sides of a point a wire's tangent is taken."""
 ALONG = 0  # of the unknowns: the place along the entry direction, which is held
 SNAPS = 3.0
 """A derivative of more than this many times a rigid wire's is a snap: that frame is not used in this round."""
