@@ -16,6 +16,7 @@ from pipeline.calibrate.unknowns import ROLL, WALL, Unknown
 from pipeline.model import Array
 from pipeline.simulate.clamp import STEP_DEPTH_MM
 from pipeline.simulate.config import SolverConfig
+from solver import Solution
 
 ROUNDS, SETTLED = 12, 0.15
 """Most rounds; it ends where a step is smaller than this part of the standard deviations."""
@@ -111,14 +112,20 @@ class Problem:
         """Whitened residuals of each insertion at several vectors."""
         pairs = [(one.trial, p) for x in xs for one, p in zip(self.evidence, self.points(x), strict=True)]
         wires = replayed(pairs, self.solver)
-        found, count = [], len(self.evidence)
-        for k in range(len(xs)):
-            own = []
-            for i, one in enumerate(self.evidence):
-                rows = one.rows(wires[k * count + i], pairs[k * count + i][1])
-                own.append(one.whitened(rows.across_mm, np.nan_to_num(rows.force_N), weights[i], scale))
-            found.append(own)
-        return found
+        count = len(self.evidence)
+        points = [point for _, point in pairs]
+        return [
+            self.left(wires[first : first + count], points[first : first + count], weights, scale)
+            for first in range(0, len(wires), count)
+        ]
+
+    def left(
+        self, wires: Sequence[Sequence[Solution]], points: Sequence[Point], weights: Sequence[Array], scale: float
+    ) -> list[Array]:
+        """Whitened residuals of each case that wires, one list a case, leave."""
+        each = zip(self.evidence, wires, points, weights, strict=True)
+        rows = [(one, one.rows(own, point), weight) for one, own, point, weight in each]
+        return [one.whitened(r.across_mm, np.nan_to_num(r.force_N), weight, scale) for one, r, weight in rows]
 
     def value(self, x: Array, residual: Sequence[Array]) -> float:
         """The objective: minus twice the logarithm of the posterior."""

@@ -8,7 +8,7 @@ from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import pytest
@@ -37,6 +37,7 @@ from pipeline.run.stages.known import Frame
 from pipeline.run.stages.roll import with_fitted_roll
 from pipeline.simulate.clamp import Prior, moved
 from pipeline.simulate.config import SolverConfig
+from pipeline.simulate.resolution import moved_mm
 from pipeline.status import FrameStatus, InputError, StageError
 from pipeline.study.manifest import read_manifest
 from pipeline.study.parameters import ParametersError, read_parameters
@@ -123,32 +124,55 @@ def test_rolls_that_are_stated_a_little_wrongly_are_no_taper(off_deg):
         assert by_name[ROLL].sd > 0.5 * off_deg / np.sqrt(3.0), "three rolls each known to so much"
 
 
+AGREED = "halving them moved no fitted wire by more than 0.06 mm, no parameter by more than its sd"
+
+
+@pytest.fixture(scope="module")
+def at_truth() -> Fit:
+    """A fit that found the truth."""
+    problem = Problem(all_of(one := trial()), {}, (Evidence(one),), SETTINGS)
+    x = np.concatenate([[TRUE[u.name] for u in problem.free], np.zeros(OWN + len(DEPTHS))])
+    return Fit(problem, problem.linear(x), ())
+
+
 @pytest.mark.parametrize(
     ("asked", "moves_mm", "fitted_with", "said"),
     [
-        ("auto", 0.0, [1.0], "halving them moved no fitted wire by more than 0.06 mm"),
-        ("auto", 0.7, [1.0, 0.25], "halving them moved no fitted wire by more than 0.06 mm"),
-        ("auto", 50.0, [1.0, 0.0625], "at 4 of 4 depths the wire still depends on their length"),
+        ("auto", 0.0, [1.0], AGREED),
+        ("auto", 0.7, [1.0, 0.25], AGREED),
+        ("auto", 50.0, [1.0, 0.0625], "halving longer ones moved 4 of 4 fitted wires by more than 0.06 mm"),
         (0.4, 50.0, [0.4], "as stated"),
     ],
 )
-def test_segments_of_a_fit_are_as_short_as_its_wires_need(monkeypatch, asked, moves_mm, fitted_with, said):
+def test_segments_of_a_fit_are_as_short_as_its_wires_need(monkeypatch, at_truth, asked, moves_mm, fitted_with, said):
     """They were the longest under auto, and twice those that were stated: friction was 8 standard deviations off."""
-    used, wires = [], [replayed([(trial(), Point(TRUE, np.zeros(OWN + len(DEPTHS))))], SETTINGS)[0]]
+    used, (wires,) = [], segments._wires(at_truth, SETTINGS)
 
     def fit_with(solver):
         used.append(solver)
-        return cast(Fit, None)
+        return at_truth
 
     def of_length(_, solver):
-        return [replace(wire, joints_mm=wire.joints_mm + moves_mm * solver.segment_mm**2) for wire in wires[0]]
+        return [[replace(wire, joints_mm=wire.joints_mm + moves_mm * solver.segment_mm**2) for wire in wires]]
 
     monkeypatch.setattr(segments, "_wires", of_length)
+    monkeypatch.setattr(segments, "MOST_SD", np.inf)
     _, found = segments.resolved(fit_with, WIRE, SolverConfig(segment_mm=asked))
     assert [solver.segment_mm for solver in used] == fitted_with
     assert {solver.finest_mm for solver in used} == {1.0}, "no step is repeated in a fit"
     assert (found.mm, found.reason) == (fitted_with[-1], said)
     assert ("0.0625 mm, the shortest, may be too long" in found.doubt) == (moves_mm > 10.0 and asked == "auto")
+
+
+@pytest.mark.parametrize(("shares", "moved"), [(0.5, ""), (3.0, "rest_curvature by 3.")])
+def test_segments_may_not_move_a_parameter_by_more_than_is_known_of_it(at_truth, shares, moved):
+    """Of a rest curvature 1.5 standard deviations were wires 0.05 mm elsewhere, which is near enough for a run."""
+    coarse, sd = segments._wires(at_truth, SETTINGS), at_truth.sd[REST]
+    further = at_truth.linear.x + shares * sd * np.array([u.name == REST for u in at_truth.problem.free] + [False] * 11)
+    fine = segments._wires(replace(at_truth, linear=replace(at_truth.linear, x=further)), SETTINGS)
+    assert max(moved_mm(a, b) for a, b in zip(coarse[0], fine[0], strict=True)) < 0.06
+    assert segments._moved(at_truth, fine, coarse).startswith(moved)
+    assert bool(segments._moved(at_truth, coarse, fine)) == bool(moved)
 
 
 def test_wires_of_a_fit_have_the_stated_segments():
