@@ -65,6 +65,7 @@ def render_calibration(out: Path) -> Path:
     page = {
         "title": "wireval calibration",
         "used": record["used"],
+        "insertions": counted(len({one["group"] for one in record["used"]}), "insertion"),
         "unseen": unseen,
         "traces": _of_the_traces(record),
         "gained": gained(record["frames"]),

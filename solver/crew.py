@@ -32,11 +32,13 @@ class Job(NamedTuple):
         return [self.insertion.wire.segments_at(d)[0] + 1 for d in longest[1:]]
 
 
-def go_alone(job: Job) -> None:
-    """Do a job that nobody else can do at the same time."""
-    insertion = job.insertion
-    insertion._begin(job.depths, job.rolls)
-    job.found.extend(insertion._go(depth, roll) for depth, roll in zip(job.depths, job.rolls, strict=True))
+def go_alone(queue: deque[Job]) -> None:
+    """Do the one job of a queue, which nobody else can do at the same time, up to a depth at which it was taken out."""
+    for job in list(queue):
+        job.insertion._begin(job.depths, job.rolls)
+        for depth, roll in zip(job.depths, job.rolls, strict=True):
+            if queue:
+                job.found.append(job.insertion._go(depth, roll))
 
 
 def _next(queue: deque[Job]) -> Job | None:

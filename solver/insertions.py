@@ -89,7 +89,8 @@ class Insertions:
 def _outlast(running: list[Future[None]], waiting: Iterable[deque[Job]]) -> None:
     """Wait for threads to end, however often Ctrl-C is pressed: they would still move a wire that is released earlier.
 
-    After the first Ctrl-C they take no more jobs, but finish those begun; then KeyboardInterrupt is raised.
+    After the first Ctrl-C they take no more jobs; of those begun, wires in lanes are finished, one alone goes no
+    further than to its next depth. Then KeyboardInterrupt is raised.
     """
     pressed = None
     while not all(task.done() for task in running):
@@ -108,7 +109,7 @@ def _outlast(running: list[Future[None]], waiting: Iterable[deque[Job]]) -> None
 def _tasks(kind: deque[Job], threads: int) -> list[Callable[[], None]]:
     """The calls, each for a thread of its own, that do all jobs of one kind."""
     if len(kind) == 1:
-        return [partial(go_alone, kind[0])]
+        return [partial(go_alone, kind)]
     crews = min(threads, -(-len(kind) // WIDTH))
     teams = [Crew(kind, -(-len(kind) // crews)) for _ in range(crews)]
     return [partial(crew.lead, kind) for crew in teams]

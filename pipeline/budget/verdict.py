@@ -12,11 +12,11 @@ from scipy.special import chdtri, fdtri
 
 from pipeline.arrays.polyline import across, tangents
 from pipeline.model import Array
+from pipeline.simulate.clamp import TANGENT_MM
 
 COVERED = 0.95
 ROUND = 0.5 * float(np.sqrt(chdtri(2, 1.0 - COVERED)))
 """u of an error whose two components have a standard deviation of 1."""
-TANGENT_MM = 0.25
 
 
 class Judged(NamedTuple):

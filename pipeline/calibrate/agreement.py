@@ -26,20 +26,21 @@ def own_rolls(fit: Fit) -> dict[str, tuple[float, float]]:
     """
     problem, linear, k = fit.problem, fit.linear, [u.name for u in fit.problem.free].index(ROLL)
     means, sigmas = problem.prior
-    of_each = zip(problem.evidence, problem.parts(), linear.jacobian, linear.residual, strict=True)
     found = {}
-    for one, part, jacobian, rest in of_each:
-        turn = part.start + OWN - 1
-        own = [i for i in range(part.start, part.stop) if sigmas[i] > 0.0 and i != turn]
-        columns = jacobian[:, [k, *own]]
+    for cases in problem.insertions:
+        parts, trial = [problem.parts[i] for i in cases], problem.evidence[cases[0]].trial
+        turn = parts[0][OWN - 1]
+        own = [i for i in np.unique(np.concatenate(parts)) if sigmas[i] > 0.0 and i != turn]
+        columns, rest = (np.concatenate([each[i] for i in cases]) for each in (linear.jacobian, linear.residual))
+        columns = columns[:, [k, *own]]
         precision = np.concatenate([[0.0], sigmas[own] ** -2.0])
         normal = columns.T @ columns + np.diag(precision)
-        if one.trial.roll_free or not normal[0, 0] > 0.0:
+        if trial.roll_free or not normal[0, 0] > 0.0:
             continue
         from_prior = np.concatenate([[0.0], (means - linear.x)[own]])
         wanted = np.linalg.solve(normal, columns.T @ rest + precision * from_prior)
         sd = float(np.hypot(np.sqrt(np.linalg.inv(normal)[0, 0]), sigmas[turn]))
-        found[one.trial.name] = float(wanted[0] + linear.x[turn]), sd
+        found[trial.group] = float(wanted[0] + linear.x[turn]), sd
     return found
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from pipeline.calibrate.fit import Problem
 from pipeline.calibrate.residuals import Evidence
 from pipeline.calibrate.search import FIRST_FRICTION
-from pipeline.calibrate.trials import OWN, Point, Trial, replayed
+from pipeline.calibrate.trials import OWN, Point, Trial, lengths_of, quick, replayed
 from pipeline.calibrate.unknowns import FRICTION, Unknown
 from pipeline.model import Curve
 from pipeline.simulate.clamp import TracedFrame
@@ -47,6 +47,7 @@ def predicted(free: Sequence[Unknown], planned: Sequence[Trial], solver: SolverC
     """Standard deviations of all parameters; ValueError where a planned depth is not reached."""
     shared = {u.name: max(u.prior, FIRST_FRICTION) if u.name == FRICTION else u.prior for u in free}
     points = [Point(shared, np.zeros(OWN + len(trial.seen))) for trial in planned]
+    solver = quick(solver, lengths_of(planned[0].wire, solver)[0])
     found = []
     for trial, wires in zip(planned, replayed(list(zip(planned, points, strict=True)), solver), strict=True):
         seen, voxel = [], trial.voxel_mm
@@ -59,6 +60,6 @@ def predicted(free: Sequence[Unknown], planned: Sequence[Trial], solver: SolverC
         force = None if trial.force_N is None else np.array([wire.push_force_N for wire in wires])
         found.append(Evidence(replace(trial, seen=tuple(seen), force_N=force)))
     problem = Problem(tuple(free), {}, tuple(found), solver)
-    x = np.concatenate([[shared[u.name] for u in free], np.zeros(sum(OWN + len(t.seen) for t in planned))])
+    x = np.concatenate([[shared[u.name] for u in free], np.zeros(len(problem.prior[0]) - len(free))])
     deviations = np.sqrt(np.diag(problem.linear(x).covariance))
     return [Predicted(u, float(v)) for u, v in zip(free, deviations, strict=False)]

@@ -13,6 +13,7 @@ from pipeline.calibrate.agreement import no_common_roll, turned_alone
 from pipeline.calibrate.fit import Linear, Problem
 from pipeline.calibrate.residuals import Evidence
 from pipeline.calibrate.search import Fit, fitted, held_at_prior
+from pipeline.calibrate.segments import Segments, resolved
 from pipeline.calibrate.trials import replayed
 from pipeline.calibrate.unknowns import ROLL, Unknown, spread_in_words
 from pipeline.model import Array
@@ -64,6 +65,7 @@ class Calibration:
     frames: tuple[FrameError, ...]
     fit: Fit
     scale: float
+    segments: Segments
 
     @property
     def values(self) -> dict[str, float]:
@@ -77,10 +79,14 @@ def calibrated(free: Sequence[Unknown], evidence: Sequence[Evidence], solver: So
     Insertions that want no common roll have each its own in all that is found: under one that is wrong for each of
     them a taper of 1 came out as 0.76 to 1.5, by up to 6.5 of its standard deviations.
     """
-    whole = fitted(free, evidence, solver)
-    apart = {ROLL: no_common_roll(whole)}
-    if apart[ROLL]:
-        whole = fitted(free, [turned_alone(one) for one in evidence], solver)
+    apart: dict[str, str] = {}
+
+    def fit_with(settings: SolverConfig) -> Fit:
+        whole = fitted(free, evidence, settings)
+        apart[ROLL] = no_common_roll(whole)
+        return fitted(free, [turned_alone(one) for one in evidence], settings) if apart[ROLL] else whole
+
+    whole, segments = resolved(fit_with, evidence[0].trial.wire, solver)
     profiles = profiles_of(whole)
     found = [_judged(u, whole, p, apart.get(u.name, "")) for u, p in zip(whole.problem.free, profiles, strict=True)]
     unseen = [e.unknown.name for e in found if not e.seen]
@@ -90,7 +96,7 @@ def calibrated(free: Sequence[Unknown], evidence: Sequence[Evidence], solver: So
     covariance = whole.linear.covariance[:n, :n]
     deviations = np.sqrt(np.diag(covariance))
     correlation = covariance / np.outer(deviations, deviations)
-    return Calibration(estimates, correlation, tuple(_errors(last, evidence)), last, last.linear.scale)
+    return Calibration(estimates, correlation, tuple(_errors(last, evidence)), last, last.linear.scale, segments)
 
 
 def _judged(unknown: Unknown, fit: Fit, profile: tuple[tuple[float, float], ...], apart: str = "") -> Estimate:

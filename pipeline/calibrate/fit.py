@@ -5,8 +5,10 @@ Derivatives are difference quotients of whole insertions, which are simulated si
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipeline.calibrate.residuals import Evidence, Rows, weights_of
 from pipeline.calibrate.trials import OWN, OWN_STEPS, Point, replayed
@@ -14,11 +16,13 @@ from pipeline.calibrate.unknowns import ROLL, WALL, Unknown
 from pipeline.model import Array
 from pipeline.simulate.clamp import STEP_DEPTH_MM
 from pipeline.simulate.config import SolverConfig
+from solver import Solution
 
 ROUNDS, SETTLED = 12, 0.15
 """Most rounds; it ends where a step is smaller than this part of the standard deviations."""
 DAMPINGS = (1.0, 10.0)
 """Tried side by side, in units of the present damping."""
+Entries = NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +52,8 @@ class Linear:
 class Problem:
     """What is fitted: the free unknowns, the values of the others, the insertions.
 
-    A vector holds the free unknowns, then OWN numbers and a depth for each frame of every insertion.
+    A vector holds the free unknowns, then OWN numbers of every insertion and a depth for each of its frames. Cases of
+    one insertion have those OWN numbers in common: taken for three, one had its roll known by the root of 3 too well.
     """
 
     free: tuple[Unknown, ...]
@@ -61,25 +66,41 @@ class Problem:
         """Whether every insertion has traces that state their standard deviations."""
         return all(one.stated for one in self.evidence)
 
-    def parts(self) -> list[slice]:
-        """The slice of a vector that holds each insertion's own numbers."""
-        found, first = [], len(self.free)
-        for one in self.evidence:
-            found.append(slice(first, first + OWN + len(one.trial.seen)))
-            first = found[-1].stop
+    @property
+    def insertions(self) -> list[list[int]]:
+        """For each insertion the positions of its cases in ``evidence``."""
+        found: dict[object, list[int]] = {}
+        for i, one in enumerate(self.evidence):
+            found.setdefault(one.trial.insertion, []).append(i)
+        return list(found.values())
+
+    @cached_property
+    def parts(self) -> list[Entries]:
+        """For each case the entries (OWN + frames,) of a vector that are its own: its insertion's, then its depths."""
+        first_of = {i: cases[0] for cases in self.insertions for i in cases}
+        found, free = list[Entries](), len(self.free)
+        for i, one in enumerate(self.evidence):
+            count = len(one.trial.seen) + OWN * (first_of[i] == i)
+            entries = np.arange(free, free + count)
+            found.append(entries if first_of[i] == i else np.concatenate([found[first_of[i]][:OWN], entries]))
+            free += count
         return found
 
-    @property
+    @cached_property
     def prior(self) -> tuple[Array, Array]:
-        """Means and standard deviations (p,) of the priors."""
-        own = np.concatenate([one.trial.sigmas for one in self.evidence])
-        means = np.concatenate([[u.prior for u in self.free], np.zeros(len(own))])
-        return means, np.concatenate([[u.sd for u in self.free], own])
+        """Means and standard deviations (p,) of the priors: the least of what cases of one insertion state."""
+        free = np.array([(u.prior, u.sd) for u in self.free]).reshape(-1, 2)
+        count = 1 + max(int(part.max()) for part in self.parts) - len(free)
+        means = np.concatenate([free[:, 0], np.zeros(count)])
+        sigmas = np.concatenate([free[:, 1], np.full(count, np.inf)])
+        for one, part in zip(self.evidence, self.parts, strict=True):
+            sigmas[part] = np.minimum(sigmas[part], one.trial.sigmas)
+        return means, sigmas
 
     def points(self, x: Array) -> list[Point]:
-        """A vector as one Point per insertion: the shared parameters and the insertion's own numbers."""
+        """A vector as one Point per case: the shared parameters and its own numbers."""
         shared = self.held | {u.name: float(v) for u, v in zip(self.free, x, strict=False)}
-        return [Point(shared, x[part]) for part in self.parts()]
+        return [Point(shared, x[part]) for part in self.parts]
 
     def clipped(self, x: Array) -> Array:
         """A vector with its free unknowns clipped to their bounds."""
@@ -91,14 +112,20 @@ class Problem:
         """Whitened residuals of each insertion at several vectors."""
         pairs = [(one.trial, p) for x in xs for one, p in zip(self.evidence, self.points(x), strict=True)]
         wires = replayed(pairs, self.solver)
-        found, count = [], len(self.evidence)
-        for k in range(len(xs)):
-            own = []
-            for i, one in enumerate(self.evidence):
-                rows = one.rows(wires[k * count + i], pairs[k * count + i][1])
-                own.append(one.whitened(rows.across_mm, np.nan_to_num(rows.force_N), weights[i], scale))
-            found.append(own)
-        return found
+        count = len(self.evidence)
+        points = [point for _, point in pairs]
+        return [
+            self.left(wires[first : first + count], points[first : first + count], weights, scale)
+            for first in range(0, len(wires), count)
+        ]
+
+    def left(
+        self, wires: Sequence[Sequence[Solution]], points: Sequence[Point], weights: Sequence[Array], scale: float
+    ) -> list[Array]:
+        """Whitened residuals of each case that wires, one list a case, leave."""
+        each = zip(self.evidence, wires, points, weights, strict=True)
+        rows = [(one, one.rows(own, point), weight) for one, own, point, weight in each]
+        return [one.whitened(r.across_mm, np.nan_to_num(r.force_N), weight, scale) for one, r, weight in rows]
 
     def value(self, x: Array, residual: Sequence[Array]) -> float:
         """The objective: minus twice the logarithm of the posterior."""
@@ -108,9 +135,9 @@ class Problem:
 
     def columns(self, index: int) -> dict[int, float]:
         """Entries of a vector that move an insertion's wires, each with its step; not the depths, moved all at once."""
-        trial, part = self.evidence[index].trial, self.parts()[index]
+        part, sigmas = self.parts[index], self.prior[1]
         found = {k: u.step for k, u in enumerate(self.free) if self._concerns(u, index)}
-        return found | {part.start + k: OWN_STEPS[k] for k in range(OWN) if trial.sigmas[k] > 0}
+        return found | {int(part[k]): OWN_STEPS[k] for k in range(OWN) if sigmas[part[k]] > 0}
 
     def _concerns(self, unknown: Unknown, index: int) -> bool:
         trial = self.evidence[index].trial
@@ -122,8 +149,8 @@ class Problem:
         """The problem linearised at a vector, all its difference quotients simulated side by side."""
         here, pairs, steps = self.points(x), [], []
         for i, one in enumerate(self.evidence):
-            part, columns = self.parts()[i], self.columns(i)
-            deeper = x + STEP_DEPTH_MM * (np.arange(len(x)) >= part.start + OWN) * (np.arange(len(x)) < part.stop)
+            part, columns = self.parts[i], self.columns(i)
+            deeper = x + STEP_DEPTH_MM * np.isin(np.arange(len(x)), part[OWN:])
             changed = [x + step * (np.arange(len(x)) == k) for k, step in columns.items()]
             pairs += [(one.trial, self.points(v)[i]) for v in (x, *changed, deeper)]
             steps.append(columns)
@@ -136,10 +163,9 @@ class Problem:
             for k, step in columns.items():
                 across[:, :, k], push[:, k] = one.slopes(still, next(wires), (here[i], next(points)), step)
             change, more = one.slopes(still, next(wires), (here[i], next(points)), STEP_DEPTH_MM)
-            first = self.parts()[i].start + OWN
             for f, end in enumerate(np.cumsum(one.counts)):
-                run = slice(end - one.counts[f], end)
-                across[run, :, first + f], push[f, first + f] = change[run], more[f]
+                run, entry = slice(end - one.counts[f], end), self.parts[i][OWN + f]
+                across[run, :, entry], push[f, entry] = change[run], more[f]
             slopes.append((across, push))
         return self._assembled(x, base, slopes)
 

@@ -16,11 +16,12 @@ from scipy.linalg import cholesky, solve_triangular
 from pipeline.arrays.polyline import at_arc, tangents
 from pipeline.calibrate.trials import Point, Trial, depths_at
 from pipeline.model import Array
+from pipeline.simulate.clamp import FIRST_MM, LAST_MM, TANGENT_MM
 from pipeline.simulate.evidence import TraceSamples, covariance_of_traces
 from solver import Solution
 
-FIRST_MM, LAST_MM, EVERY_MM = 0.5, 0.5, 1.5  # the trace's own ends are left out
-TANGENT_MM = 0.25
+EVERY_MM = 1.5
+"""Between the points of a trace that are fitted; its own ends are left out."""
 WALL_VOXELS, WALL_BELL_MM = 0.1, 3.0
 """Local error of a segmented wall: standard deviation in voxels, and the length (mm) over which it is correlated."""
 MODEL_VOXELS, MODEL_BELL_MM = 0.15, 6.0
@@ -50,7 +51,7 @@ class Evidence:
     """An insertion's traces as the data of a fit."""
 
     trial: Trial
-    _roots: dict[str, Any] = field(default_factory=dict)
+    _roots: dict[str, Any] = field(default_factory=dict, init=False)
 
     @cached_property
     def traces(self) -> list[TraceSamples]:

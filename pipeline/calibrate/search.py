@@ -7,7 +7,7 @@ import numpy as np
 
 from pipeline.calibrate.fit import Linear, Problem
 from pipeline.calibrate.residuals import Evidence
-from pipeline.calibrate.trials import OWN
+from pipeline.calibrate.trials import OWN, lengths_of, quick
 from pipeline.calibrate.unknowns import BENDING, FRICTION, ROLL, Unknown
 from pipeline.model import Array
 from pipeline.simulate.config import SolverConfig
@@ -81,8 +81,9 @@ class OwnRoll:
 
 def own_roll(one: Evidence, friction: float, solver: SolverConfig) -> OwnRoll:
     """The roll at which a wire lies as it was traced; all else but the clamp is as stated."""
-    problem = Problem((), {FRICTION: friction}, (one,), solver)
-    still = Problem((), {FRICTION: 0.0}, (one,), solver)
+    longest = quick(solver, lengths_of(one.trial.wire, solver)[0])
+    problem = Problem((), {FRICTION: friction}, (one,), longest)
+    still = Problem((), {FRICTION: 0.0}, (one,), longest)
     means, _ = problem.prior
     xs = [np.where(np.arange(len(means)) == OWN - 1, roll, means) for roll in ROLLS_DEG]
     even = [np.ones(len(one.trial.seen))]
@@ -119,8 +120,8 @@ def _starts(problem: Problem) -> list[Array]:
     for roll in ROLLS_DEG:
         x = means.copy()
         x[at] = roll
-        for one, part in zip(problem.evidence, problem.parts(), strict=True):
-            x[part.start + OWN - 1] = roll if one.trial.roll_free else 0.0
+        for one, part in zip(problem.evidence, problem.parts, strict=True):
+            x[part[OWN - 1]] = roll if one.trial.roll_free else 0.0
         xs.append(x)
     even = [np.ones(len(one.trial.seen)) for one in problem.evidence]
     found = problem.residuals(xs, even, 1.0)
@@ -131,8 +132,8 @@ def _starts(problem: Problem) -> list[Array]:
     valleys = _valleys(together)
     for k in valleys[:1] if free.all() else valleys:  # no insertion asks for a common roll: all starts would be one
         x = xs[k].copy()
-        for i, part in enumerate(problem.parts()):
-            if free[i]:
-                x[part.start + OWN - 1] = ROLLS_DEG[int(np.argmin(each[:, i]))]
+        for cases in problem.insertions:
+            if free[cases[0]]:
+                x[problem.parts[cases[0]][OWN - 1]] = ROLLS_DEG[int(np.argmin(each[:, cases].sum(axis=1)))]
         chosen.append(x)
     return chosen

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.calibrate.unknowns import FRICTION, MOST_CURVED, REST, ROLL, bent, wall_factor
+from pipeline.calibrate.unknowns import FRICTION, ROLL, bent, wall_factor
 from pipeline.model import Array, Clamp, OverWire, Wall, Wire
 from pipeline.simulate import inserted, together
 from pipeline.simulate.clamp import STEP_MM, STEP_RAD, TIP_VOXELS, Prior, TracedFrame, depth_from, moved
@@ -26,7 +26,8 @@ UNKNOWN_ROLL_DEG = 104.0
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """An insertion with its traces. vessel : the wall at stiffness 1.     wall : as stated.     given, prior : clamp.
+    """A case with its traces. group : of the cases of one insertion.     vessel : the wall at stiffness 1.
+    wall : as stated.     given, prior : clamp.
 
     seen : the frames that are fitted.     passed : those whose trace is refused, which the wire went through as well.
     roll_free : the roll is not stated.     roll_sigma_deg : how well it is where it is: an offset that all insertions
@@ -35,6 +36,7 @@ class Trial:
     """
 
     name: str
+    group: str
     vessel: VesselWall
     wire: Wire
     wall: Wall
@@ -48,6 +50,11 @@ class Trial:
     force_N: Array | None = None
     force_sigma_N: float = 1e-3
     passed: tuple[Stop, ...] = ()
+
+    @property
+    def insertion(self) -> tuple[str, bool]:
+        """By which its cases are known: a roll that is fitted and one that is stated have no error in common."""
+        return self.group, self.roll_free
 
     @property
     def sigmas(self) -> Array:
@@ -77,11 +84,17 @@ def insertion_at(trial: Trial, point: Point, solver: SolverConfig) -> Insertion:
     vessel = trial.vessel.like(stiffness_N_mm2=stiffness, friction=point.shared.get(FRICTION, trial.wall.friction))
     # a wall that is nearer by some length is the same as a wire with a radius larger by it
     wire = replace(trial.wire, radius_mm=max(trial.wire.radius_mm + float(point.own[5]), 1e-3))
-    # a length that is asked for is not doubled where the strongest curvature that is tried would not fit
-    strongest = wire if solver.segment_mm == "auto" else bent(wire, {REST: float(np.log(MOST_CURVED))})
-    length = lengths_mm(solver.segment_mm, strongest.rest_curvature_per_mm)[0]
-    settings = replace(solver, segment_mm=length, finest_mm=solver.step_mm)
-    return inserted(vessel, bent(wire, point.shared), moved(trial.given, point.own[:5]), settings, 1.0, trial.catheter)
+    return inserted(vessel, bent(wire, point.shared), moved(trial.given, point.own[:5]), solver, 1.0, trial.catheter)
+
+
+def lengths_of(wire: Wire, solver: SolverConfig) -> list[float]:
+    """Segment lengths to fit with, mm, each half of the one before; the stated one alone, where one is."""
+    return lengths_mm("auto", wire.rest_curvature_per_mm) if solver.segment_mm == "auto" else [solver.segment_mm]
+
+
+def quick(solver: SolverConfig, segment_mm: float) -> SolverConfig:
+    """The settings of a fit with segments of one length: no step is repeated."""
+    return replace(solver, segment_mm=segment_mm, finest_mm=solver.step_mm)
 
 
 def way_at(trial: Trial, point: Point) -> Way:

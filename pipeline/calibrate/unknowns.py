@@ -73,7 +73,7 @@ def unknowns(walls_N_mm2: Sequence[float], friction: float, *, weighed: bool) ->
             ROLL, 0.0, 100.0, -180.0, 180.0, 1.0, 8.0, "degrees added to the stated roll: the plane of the tip's curve"
         ),
         _factor(REST, 0.5, MOST_CURVED, 0.02, "factor on the rest curvature"),
-        _factor(TAPER, 0.7, 5.0, 0.05, "factor on the shaft's stiffness relative to the tip's"),
+        _factor(TAPER, 0.7, 5.0, 0.05, "factor on the shaft's stiffness over the tip's; its lengths stay as stated"),
     ]
     for stiffness in sorted(set(walls_N_mm2)):
         what = f"factor on wall stiffness over the wire's, walls stated at {stiffness:g} N/mm2"

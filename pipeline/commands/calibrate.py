@@ -55,11 +55,13 @@ def _fit(args: argparse.Namespace, cases: "tuple[Case, ...]", config: "Config", 
     """Fit, write, and say what was found."""
     from pipeline.calibrate.unknowns import spread_in_words
     from pipeline.run.calibration import calibrate, gathered
-    from pipeline.run.calibration_files import flattened, misfit, write_parameters, write_record
+    from pipeline.run.calibration_files import segments_said, warnings_of, write_parameters, write_record
     from reports.calibration import gained, render_calibration, to_its_digits
 
     found = gathered(cases, config, store, (lambda _: None) if args.quiet else say)
     fit = calibrate(found, config)
+    if not args.quiet:
+        say(segments_said(fit))
     file = args.out / "parameters.toml"
     before = file.read_bytes() if file.exists() else b""
     written = write_parameters(file, found, fit)
@@ -72,7 +74,7 @@ def _fit(args: argparse.Namespace, cases: "tuple[Case, ...]", config: "Config", 
         say(f"{one.name:20s} {used if one.seen else f'{one.used:g}':>10s}  +- {sd:8s}{verdict}")
     if said := gained([vars(frame) for frame in fit.frames]):
         say(said)
-    warnings = (f"warning: {text}" for text in (*misfit(fit), *flattened(found)))
+    warnings = (f"warning: {text}" for text in warnings_of(found, fit))
     aside([*warnings, *found.left_out], quiet=args.quiet)
     if before not in (b"", file.read_bytes()):
         say(f"{file}: that of a calibration before, which said otherwise, is replaced")

@@ -1,8 +1,8 @@
 """``wireval calibrate``: trace the cases of role calibration and fit the parameters (files: ``calibration_files``)."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 from scipy.special import ndtri, stdtrit
@@ -18,12 +18,13 @@ from pipeline.run.inputs import Inputs
 from pipeline.run.log import Log
 from pipeline.run.stages import Context, run_stages
 from pipeline.run.stages.given import trial_of
-from pipeline.run.stages.known import trusted
+from pipeline.run.stages.known import Frame, Known, trusted
 from pipeline.run.stages.load import each_frame
-from pipeline.run.stages.repeated import kept
+from pipeline.run.stages.repeated import copies, kept, scanned_twice
 from pipeline.status import InputError
 from pipeline.study.manifest import Case
 from pipeline.study.settings import Config
+from reports.case_files import counted
 
 SAME_MM = 0.5
 """Standard deviation between insertions, mm, of the offset of stated depths, where one insertion alone states any."""
@@ -40,19 +41,21 @@ class CalibrationError(InputError):
 
 @dataclass(frozen=True, eq=False)
 class Gathered:
-    """Calibration cases and their insertions.
+    """Calibration cases as they are fitted.
 
     stated_mm : the depth that the manifest states for each fitted frame, NaN where none.     voxels, traced_mm : by
     which each case's scans are known again, and points (n, 3) on their traces, by which those are known that were
-    written again.     left_out : cases that cannot be used, and why.     notes : assumptions and warnings of all cases.
+    written again.     left_out : cases that cannot be used, and why.     warnings : of frames that count twice.
+    notes : assumptions and warnings of all cases.
     """
 
     cases: tuple[Case, ...]
     trials: tuple[Trial, ...]
-    stated_mm: tuple[np.ndarray[Any, np.dtype[np.float64]], ...]
+    stated_mm: tuple[Array, ...]
     voxels: tuple[tuple[str, ...], ...]
     traced_mm: tuple[tuple[Array, ...], ...]
     left_out: tuple[str, ...]
+    warnings: tuple[str, ...]
     notes: tuple[str, ...]
 
 
@@ -80,34 +83,74 @@ def chosen(cases: Sequence[Case]) -> tuple[Case, ...]:
 def gathered(cases: Sequence[Case], config: Config, store: Store, say: Say) -> Gathered:
     """Segment and trace the cases; those with fewer than LEAST_FRAMES trusted traces are left out with a note.
 
-    CalibrationError where none is left.
+    A frame that is one of an earlier case counts once. CalibrationError where no case is left.
     """
-    used, trials, stated, voxels, traced, notes = [], [], [], [], [], []
+    taken, warnings, notes = list[_Taken](), list[str](), list[str]()
     left_out = [f"{case.id}: left out: {PLANNED}" for case in cases if not case.compared]
     for case in (case for case in cases if case.compared):
-        log = Log(lambda *_: None)
-        run = Context(case, config, store, log, until="trace", inputs=Inputs.of(case))
-        known = run_stages(run)
-        changed = run.inputs.changed()
-        known = known.failed("load", changed) if changed else known
-        frames = [frame for frame in known.frames if frame.trusted_curve is not None]
-        notes += [f"{case.id}: {text}" for text in (*log.assumptions, *log.warnings)]
+        run, known = _traced(case, config, store)
+        again = _counted_before(known.frames, taken)
+        frames = [frame for frame in known.frames if frame.trusted_curve is not None and frame.index not in again]
+        notes += [f"{case.id}: {text}" for text in (*run.log.assumptions, *run.log.warnings)]
+        copied = f"{counted(len(again), 'frame')} counted already: {_first(again)}" if again else ""
         if known.failure is not None or len(frames) < LEAST_FRAMES:
-            why = known.failure or f"{len(frames)} of {len(known.frames)} frames have a trace to be trusted"
+            why = known.failure or copied or f"{len(frames)} of {len(known.frames)} frames have a trace to be trusted"
             left_out.append(f"{case.id}: left out: {why}; at least {LEAST_FRAMES} are needed")
             continue
+        warnings += [f"{case.id}: {copied}; taken once"] * bool(copied)
+        warnings += [f"{case.id}: {text}" for one in taken for text in _scanned_twice(case, frames, one)]
         say(f"{case.id}: {len(frames)} of {len(known.frames)} frames are fitted")
-        used.append(case)
-        trials.append(trial_of(run, known, known.frames, roll_free=case.roll_deg == "fit"))
-        stated.append(np.array([frame.expected_mm for frame in frames]))
-        voxels.append(tuple(frame.voxels for frame in known.frames if frame.voxels))
-        traced.append(tuple(map(kept, trusted(frames).values())))
-    if not trials:
+        taken.append(_taken(run, known, frames))
+    if not taken:
         for note in notes:
             say(note)
         raise CalibrationError(left_out)
-    known_by = tuple(voxels), tuple(traced)
-    return Gathered(tuple(used), tuple(trials), tuple(stated), *known_by, tuple(left_out), tuple(notes))
+    cases, trials, stated, voxels, traced = zip(*taken, strict=True)
+    return Gathered(cases, trials, stated, voxels, traced, tuple(left_out), tuple(warnings), tuple(notes))
+
+
+class _Taken(NamedTuple):
+    """A case that is fitted: the first of ``Gathered``'s fields."""
+
+    case: Case
+    trial: Trial
+    stated_mm: Array
+    voxels: tuple[str, ...]
+    traced_mm: tuple[Array, ...]
+
+
+def _traced(case: Case, config: Config, store: Store) -> tuple[Context, Known]:
+    """The case up to its traces; failed where its files changed meanwhile."""
+    run = Context(case, config, store, Log(lambda *_: None), until="trace", inputs=Inputs.of(case))
+    known = run_stages(run)
+    changed = run.inputs.changed()
+    return run, known.failed("load", changed) if changed else known
+
+
+def _taken(run: Context, known: Known, frames: Sequence[Frame]) -> _Taken:
+    """The case with what is fitted of it: these of its frames."""
+    fitted = {frame.index for frame in frames}
+    trial = trial_of(run, known, known.frames, roll_free=run.case.roll_deg == "fit", only=fitted)
+    stated = np.array([frame.expected_mm for frame in frames])
+    voxels = tuple(frame.voxels for frame in known.frames if frame.voxels)
+    return _Taken(run.case, trial, stated, voxels, tuple(map(kept, trusted(frames).values())))
+
+
+def _counted_before(frames: Sequence[Frame], taken: Sequence[_Taken]) -> dict[int, str]:
+    """By number the frames that are one of a case that is taken already, and in words which."""
+    found: dict[int, str] = {}
+    for one in taken:
+        found = copies(frames, one.voxels, one.traced_mm, f"a frame of case {one.case.id!r}") | found
+    return found
+
+
+def _first(again: Mapping[int, str]) -> str:
+    return next(f"frame {number} {why}" for number, why in sorted(again.items()))
+
+
+def _scanned_twice(case: Case, frames: Sequence[Frame], one: _Taken) -> list[str]:
+    """A doubt of a case that lies where another does; not of two of one insertion."""
+    return scanned_twice(frames, one.traced_mm, one.case.id) if case.group != one.case.group else []
 
 
 def all_unknowns(cases: Sequence[Case]) -> tuple[Unknown, ...]:
@@ -124,12 +167,12 @@ def calibrate(found: Gathered, config: Config) -> Calibration:
 def depth_offset(found: Gathered, fit: Calibration) -> tuple[float, float]:
     """Offset to add to stated depths, mm, and its standard deviation; NaN where none is stated."""
     points = fit.fit.problem.points(fit.fit.linear.x)
-    means, spread = [], []
+    off: dict[str, Array] = {}
     for trial, point, stated in zip(found.trials, points, found.stated_mm, strict=True):
-        off = np.array(depths_at(trial, point)) - stated
-        if np.isfinite(off).any():
-            means.append(float(np.nanmean(off)))
-            spread.append(float(np.nanstd(off) / np.sqrt(np.isfinite(off).sum())))
+        apart = np.array(depths_at(trial, point)) - stated
+        off[trial.group] = np.append(off.get(trial.group, []), apart[np.isfinite(apart)])
+    means = [float(np.mean(apart)) for apart in off.values() if len(apart)]
+    spread = [float(np.std(apart) / np.sqrt(len(apart))) for apart in off.values() if len(apart)]
     if not means:
         return float("nan"), float("nan")
     return over_insertions(means, spread)

@@ -117,6 +117,28 @@ def misfit(fit: Calibration) -> list[str]:
     ]
 
 
+def warnings_of(found: Gathered, fit: Calibration) -> list[str]:
+    """What speaks against the parameters or their standard deviations."""
+    return [*misfit(fit), *flattened(found), *filter(None, [fit.segments.doubt]), *found.warnings]
+
+
+def segments_said(fit: Calibration) -> str:
+    """How long the segments of the fit were, and why."""
+    return f"segments of {fit.segments.mm:g} mm: {fit.segments.reason}"
+
+
+def _together(found: Gathered) -> list[str]:
+    """A note of each insertion that is several cases."""
+    cases: dict[str, list[str]] = {}
+    for case in found.cases:
+        cases.setdefault(case.group, []).append(case.id)
+    return [
+        f"cases {', '.join(ids)} are one insertion (group {group!r}): clamp, roll and depth offset are common to them"
+        for group, ids in cases.items()
+        if len(ids) > 1
+    ]
+
+
 THINNEST_VOXELS, FLATTENING_VOXELS = 0.48, 0.9
 """Diameters of a wire in voxels: the thinnest that was measured, and that below which its curved tip is traced too
 flat."""
@@ -176,8 +198,9 @@ def write_record(path: Path, found: Gathered, fit: Calibration) -> None:
         "scale": fit.scale,
         "stated": fit.fit.problem.stated,
         "used": _used_by(found),
-        "warnings": [*misfit(fit), *flattened(found), *found.left_out],
-        "notes": found.notes,
+        "segment_mm": fit.segments.mm,
+        "warnings": [*warnings_of(found, fit), *found.left_out],
+        "notes": [segments_said(fit), *_together(found), *found.notes],
         "provenance": code_state(),
     }
     write_json(path, {"schema": 1, **record})

@@ -39,6 +39,7 @@ TIP_VOXELS = 0.25
 """What a traced tip may be off along the wire beyond its own standard deviation. It matters where rest curvature ends
 near the entry: 0.3 mm deeper turns such a wire by 2.6 degrees."""
 TANGENT_MM = 0.25
+"""How far to both sides of a point a wire's tangent is taken."""
 ALONG = 0  # of the unknowns: the place along the entry direction, which is held
 COARSE_MM = 0.005
 """Segments may be off by so much, root mean square over the points that are fitted: a third of what noise leaves of the

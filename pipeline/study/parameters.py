@@ -99,6 +99,11 @@ class Parameters(Strict):
         """Names of what the calibration could not see: as stated there."""
         return [found.name for found in self.estimate if not found.seen]
 
+    @property
+    def seen(self) -> list[str]:
+        """Names of what the calibration could see."""
+        return [found.name for found in self.estimate if found.seen]
+
 
 class ParametersError(InputError):
     """Parameters that cannot be used."""
@@ -175,8 +180,8 @@ def _sigmas(case: "Case", found: Parameters) -> dict[str, float]:
 
 
 def _told(case: "Case", found: Parameters, *, known_wall: bool) -> str:
-    """For the report: what was taken, and what of it the calibration could not see."""
-    parts = [f"wire, wall, friction, roll and depth offset are calibrated with {', '.join(u.case for u in found.used)}"]
+    """For the report: what is calibrated, and what stays as stated."""
+    parts = [f"calibrated with {', '.join(u.case for u in found.used)}: {', '.join(found.seen) or 'nothing'}"]
     if found.unseen:
         parts.append(f"not seen there, as stated: {', '.join(found.unseen)}")
     if not known_wall:

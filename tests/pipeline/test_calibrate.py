@@ -14,12 +14,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from pipeline.calibrate import segments
 from pipeline.calibrate.design import predicted, straight_to
 from pipeline.calibrate.estimates import Estimate, _judged, calibrated
 from pipeline.calibrate.fit import Problem
 from pipeline.calibrate.residuals import Evidence, weights_of
-from pipeline.calibrate.search import own_roll
-from pipeline.calibrate.trials import OWN, Point, Trial, replayed
+from pipeline.calibrate.search import Fit, own_roll
+from pipeline.calibrate.trials import OWN, Point, Trial, quick, replayed
 from pipeline.calibrate.unknowns import BENDING, FRICTION, REST, ROLL, TAPER, bent, lacking, spread_in_words, unknowns
 from pipeline.cli import main
 from pipeline.compare.pooled import is_pooled
@@ -28,7 +29,7 @@ from pipeline.run import calibration_files, inputs
 from pipeline.run.cache import Store
 from pipeline.run.calibrated import as_calibrated, data_of
 from pipeline.run.calibrated_wire import wire_rows
-from pipeline.run.calibration import gathered, over_insertions
+from pipeline.run.calibration import SAME_MM, depth_offset, gathered, over_insertions
 from pipeline.run.calibration_files import estimates_of, flattened, misfit
 from pipeline.run.inputs import described, other_file, stated, times_of
 from pipeline.run.log import Log
@@ -38,6 +39,7 @@ from pipeline.run.stages.known import Frame
 from pipeline.run.stages.roll import with_fitted_roll
 from pipeline.simulate.clamp import Prior, moved
 from pipeline.simulate.config import SolverConfig
+from pipeline.simulate.resolution import moved_mm
 from pipeline.status import FrameStatus, InputError, StageError
 from pipeline.study.manifest import read_manifest
 from pipeline.study.parameters import ParametersError, read_parameters
@@ -47,7 +49,7 @@ from solver import Grid, VesselWall
 from tests.pipeline.test_manifest import GOOD, written
 
 WIRE = Wire("w", 0.18, [(0.0, 0.5), (10.0, 0.5), (30.0, 2.0)], [(0.0, 0.1), (8.0, 0.1), (8.0, 0.0)])
-SETTINGS = SolverConfig(segment_mm=0.5)
+SETTINGS = SolverConfig(segment_mm=1.0, finest_mm=1.0)
 X, Y, Z = np.meshgrid(*(np.arange(a, b, 0.5) for a, b in ((-5, 16), (-5, 5), (-4, 34))), indexing="ij")
 BENT = np.hypot(X - 0.012 * np.maximum(Z, 0.0) ** 2, Y) - 1.6
 VESSEL = VesselWall(Grid(BENT, [0.5] * 3, [-5.0, -5.0, -4.0]), stiffness_N_mm2=1.0)
@@ -57,7 +59,7 @@ TRUE = {ROLL: 17.0, REST: np.log(1.15), TAPER: np.log(1.4), "wall:0.05": np.log(
 
 def trial(wire: Wire = WIRE, values=TRUE, depths=DEPTHS, noise=0.0, **changes) -> Trial:
     clamp = Clamp(np.zeros(3), np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0]))
-    empty = Trial("t", VESSEL, wire, Wall(0.05), clamp, Prior(0.1, 1.0), (), 0.3, **changes)
+    empty = Trial("t", "t", VESSEL, wire, Wall(0.05), clamp, Prior(0.1, 1.0), (), 0.3, **changes)
     planned = straight_to(empty, depths, [30.0] * len(depths))
     (wires,) = replayed([(planned, Point(values, np.zeros(OWN + len(depths))))], SETTINGS)
     rng, seen = np.random.default_rng(3), []
@@ -82,7 +84,7 @@ def test_parameters_are_found_again_and_the_clamp_with_them():
     by_name = {e.unknown.name: e for e in fit.estimates}
     assert by_name[ROLL].seen
     assert by_name[REST].seen
-    own = fit.fit.linear.x[fit.fit.problem.parts()[0]]
+    own = fit.fit.linear.x[fit.fit.problem.parts[0]]
     # stated 0.064 mm beside where it is held
     assert np.linalg.norm(moved(shifted.given, own[:5]).entry_mm[:2]) < 0.03
     assert all(frame.after_mm < frame.before_mm for frame in fit.frames)
@@ -92,8 +94,8 @@ def test_parameters_are_found_again_and_the_clamp_with_them():
 def test_rolls_that_are_stated_wrongly_have_no_common_offset(stated_deg, apart):
     """Of two insertions, one stated 11 degrees off, the mean was taken: 5 degrees wrong for both, +- 0.7, seen."""
     first, second = (
-        replace(trial(noise=0.01), name="a"),
-        replace(trial(noise=0.01, depths=(12.0, 18.0, 22.0)), name="b"),
+        replace(trial(noise=0.01), name="a", group="a"),
+        replace(trial(noise=0.01, depths=(12.0, 18.0, 22.0)), name="b", group="b"),
     )
     seen = tuple(replace(frame, roll_deg=frame.roll_deg + stated_deg) for frame in second.seen)
     both = first, replace(second, seen=seen)
@@ -111,7 +113,7 @@ def test_rolls_that_are_stated_a_little_wrongly_are_no_taper(off_deg):
     depths = (DEPTHS, (12.0, 18.0, 22.0), (9.0, 14.0, 20.0, 26.0))
     made = []
     for n, (turn, at) in enumerate(zip(turns, depths, strict=True)):
-        one = replace(trial(noise=0.01, depths=at), name=str(n), roll_sigma_deg=off_deg)
+        one = replace(trial(noise=0.01, depths=at), name=str(n), group=str(n), roll_sigma_deg=off_deg)
         seen = tuple(replace(frame, roll_deg=frame.roll_deg + turn) for frame in one.seen)
         made.append(Evidence(replace(one, seen=seen)))
     found = calibrated(all_of(*(one.trial for one in made)), made, SETTINGS)
@@ -122,6 +124,82 @@ def test_rolls_that_are_stated_a_little_wrongly_are_no_taper(off_deg):
         mean = TRUE[ROLL] - np.mean(turns)
         assert abs(by_name[ROLL].value - mean) < 2.0 * by_name[ROLL].sd
         assert by_name[ROLL].sd > 0.5 * off_deg / np.sqrt(3.0), "three rolls each known to so much"
+
+
+AGREED = "halving them moved no fitted wire by more than 0.06 mm, no parameter by more than its sd"
+
+
+@pytest.fixture(scope="module")
+def at_truth() -> Fit:
+    """A fit that found the truth."""
+    problem = Problem(all_of(one := trial()), {}, (Evidence(one),), SETTINGS)
+    x = np.concatenate([[TRUE[u.name] for u in problem.free], np.zeros(OWN + len(DEPTHS))])
+    return Fit(problem, problem.linear(x), ())
+
+
+@pytest.mark.parametrize(
+    ("asked", "moves_mm", "fitted_with", "said"),
+    [
+        ("auto", 0.0, [1.0], AGREED),
+        ("auto", 0.7, [1.0, 0.25], AGREED),
+        ("auto", 50.0, [1.0, 0.0625], "halving longer ones moved 4 of 4 fitted wires by more than 0.06 mm"),
+        (0.4, 50.0, [0.4], "as stated"),
+    ],
+)
+def test_segments_of_a_fit_are_as_short_as_its_wires_need(monkeypatch, at_truth, asked, moves_mm, fitted_with, said):
+    """They were the longest under auto, and twice those that were stated: friction was 8 standard deviations off."""
+    used, (wires,) = [], segments._wires(at_truth, SETTINGS)
+
+    def fit_with(solver):
+        used.append(solver)
+        return at_truth
+
+    def of_length(_, solver):
+        return [[replace(wire, joints_mm=wire.joints_mm + moves_mm * solver.segment_mm**2) for wire in wires]]
+
+    monkeypatch.setattr(segments, "_wires", of_length)
+    monkeypatch.setattr(segments, "MOST_SD", np.inf)
+    _, found = segments.resolved(fit_with, WIRE, SolverConfig(segment_mm=asked))
+    assert [solver.segment_mm for solver in used] == fitted_with
+    assert {solver.finest_mm for solver in used} == {1.0}, "no step is repeated in a fit"
+    assert (found.mm, found.reason) == (fitted_with[-1], said)
+    assert ("0.0625 mm, the shortest, may be too long" in found.doubt) == (moves_mm > 10.0 and asked == "auto")
+
+
+@pytest.mark.parametrize(("shares", "moved"), [(0.5, ""), (3.0, "rest_curvature by 3.")])
+def test_segments_may_not_move_a_parameter_by_more_than_is_known_of_it(at_truth, shares, moved):
+    """Of a rest curvature 1.5 standard deviations were wires 0.05 mm elsewhere, which is near enough for a run."""
+    coarse, sd = segments._wires(at_truth, SETTINGS), at_truth.sd[REST]
+    further = at_truth.linear.x + shares * sd * np.array([u.name == REST for u in at_truth.problem.free] + [False] * 11)
+    fine = segments._wires(replace(at_truth, linear=replace(at_truth.linear, x=further)), SETTINGS)
+    assert max(moved_mm(a, b) for a, b in zip(coarse[0], fine[0], strict=True)) < 0.06
+    assert segments._moved(at_truth, fine, coarse).startswith(moved)
+    assert bool(segments._moved(at_truth, coarse, fine)) == bool(moved)
+
+
+def test_wires_of_a_fit_have_the_stated_segments():
+    one = trial()
+    at = Point(TRUE, np.zeros(OWN + len(DEPTHS)))
+    for mm in (0.5, 1.0):
+        (wires,) = replayed([(one, at)], quick(SolverConfig(), mm))
+        steps = np.linalg.norm(np.diff(wires[0].joints_mm, axis=0), axis=1)
+        assert np.median(steps) == pytest.approx(mm, rel=0.01)
+
+
+def test_cases_of_one_insertion_are_turned_by_one_mistake():
+    """Three cases of one group had their roll known by the root of 3 better than it was stated."""
+    made = [replace(trial(depths=depths), roll_sigma_deg=5.0) for depths in (DEPTHS, (12.0, 18.0, 22.0), (9.0, 20.0))]
+    sds = []
+    for groups in ("t", "t", "t"), ("a", "b", "c"):
+        both = tuple(Evidence(replace(one, group=name)) for one, name in zip(made, groups, strict=True))
+        problem = Problem(all_of(*made), {}, both, SETTINGS)
+        means, sigmas = problem.prior
+        assert len(means) == len(problem.free) + OWN * len(set(groups)) + 9
+        assert np.isfinite(sigmas).all()
+        assert sorted({int(i) for part in problem.parts for i in part}) == [*range(len(problem.free), len(means))]
+        sds.append(float(np.sqrt(problem.linear(means).covariance[0, 0])))
+    assert sds[0] > 4.9
+    assert sds[1] < 4.0
 
 
 def test_a_straight_uniform_wire_shows_no_roll_and_no_taper():
@@ -174,6 +252,14 @@ def test_derivatives_are_those_of_whole_insertions():
         assert linear.jacobian[0][:, k] == pytest.approx(central, abs=0.12 * np.abs(central).max())
 
 
+def test_an_insertion_with_other_voxels_has_a_covariance_of_its_own():
+    """Replaced, it had the Cholesky factor of the insertion that it was made of."""
+    one = Evidence(trial())
+    before = one.root(1.0)
+    other = replace(one, trial=replace(one.trial, voxel_mm=2.0 * one.trial.voxel_mm))
+    assert not np.allclose(other.root(1.0), before)
+
+
 def test_a_frame_that_lets_go_does_not_decide():
     weights, scale = weights_of([np.array([1.0, 1.2, 0.9, 80.0])], stated=True)
     assert scale == pytest.approx(1.1)
@@ -203,7 +289,7 @@ def test_a_sag_scan_weighs_the_wire():
     wide = VesselWall(Grid(np.hypot(X - 5.0, Y) - 9.0, [0.5] * 3, [-5.0, -5.0, -4.0]), stiffness_N_mm2=1.0)
     heavy = replace(WIRE, bending_stiffness_N_mm2=0.8, rest_curvature_per_mm=0.0, weight_N_per_mm=2e-5)
     clamp = Clamp(np.zeros(3), np.array([0.0, 0.0, 1.0]), None, down=np.array([1.0, 0.0, 0.0]))
-    one = Trial("sag", wide, heavy, Wall(0.05), clamp, Prior(0.05, 0.5), (), 0.3)
+    one = Trial("sag", "sag", wide, heavy, Wall(0.05), clamp, Prior(0.05, 0.5), (), 0.3)
     known = {}
     for name, weight in (("sags", 2e-5), ("floats", 0.0)):
         light = replace(one, wire=replace(heavy, weight_N_per_mm=weight))
@@ -249,6 +335,13 @@ absolute_stiffness = false
 [[wall]]
 stated_N_mm2 = 2.0
 stiffness_N_mm2 = 1.5
+[[estimate]]
+name = "rest_curvature"
+value = 1.2
+sd = 0.01
+logarithmic = true
+seen = true
+used = 1.2
 [[estimate]]
 name = "taper"
 value = 1.1
@@ -310,7 +403,9 @@ def test_a_run_takes_the_parameters(study):
     assert (case.wall.stiffness_N_mm2, case.wall.friction) == (7.0, 0.03)
     assert case.roll_deg == 12.5
     assert case.insertion_mm == (9.4,)
-    assert "taper" in case.calibrated
+    assert case.calibrated.startswith(
+        "calibrated with a: rest_curvature; not seen there, as stated: taper; no wall stated"
+    )
     assert "no wall stated at 7 N/mm2" in case.calibrated
     assert "'a' was calibrated with and is not scored" in notes[0]
 
@@ -375,6 +470,53 @@ def test_the_offset_of_depths_is_little_known_from_few_insertions():
     draw = np.random.default_rng(2).normal(0.0, 0.3, (4000, 3))
     found = [over_insertions(list(row), [0.0] * 3) for row in draw]
     assert np.mean([abs(mean) <= 1.96 * sd for mean, sd in found]) == pytest.approx(0.95, abs=0.0105)  # three sigma
+
+
+def test_depths_of_one_insertion_are_one_offset(monkeypatch):
+    """Three cases of one group: +- 0.044 mm and seen, where one case alone gives 0.5."""
+    monkeypatch.setattr("pipeline.run.calibration.depths_at", lambda trial, _: trial.depths)
+    fit: Any = SimpleNamespace(
+        fit=SimpleNamespace(linear=SimpleNamespace(x=None), problem=SimpleNamespace(points=lambda _: [None] * 3))
+    )
+    stated = tuple(np.array([10.0, 20.0, np.nan]) for _ in range(3))
+    for groups, sd in (("aaa", SAME_MM), ("abc", over_insertions([0.4, 0.5, 0.6], [0.0] * 3)[1])):
+        trials = [
+            SimpleNamespace(group=name, depths=[10.0 + off, 20.0 + off, 30.0])
+            for name, off in zip(groups, (0.4, 0.5, 0.6), strict=True)
+        ]
+        found: Any = SimpleNamespace(trials=trials, stated_mm=stated)
+        assert depth_offset(found, fit) == pytest.approx((0.5, sd), rel=0.01)
+
+
+@pytest.mark.parametrize("off_mm", [0.0, 0.002])
+def test_a_case_whose_traces_are_those_of_another_is_left_out(study, off_mm):
+    """Three copies counted as three insertions, without a word: the roll was known to 2.9 degrees for 5."""
+    for n in range(3):
+        points = np.loadtxt(study / f"{n}.csv", delimiter=",", skiprows=1) + [off_mm, 0.0, 0.0]
+        np.savetxt(study / f"again{n}.csv", points, delimiter=",", header="x,y,z", comments="")
+    text = STUDY.replace('traces = ["3.csv"]', 'traces = ["again0.csv", "again1.csv", "again2.csv"]')
+    text = text.replace("[9.0]", "[8.0, 10.0, 12.0]").replace('id = "b"', 'id = "b"\nrole = "calibration"')
+    (study / "manifest.toml").write_text(text, encoding="utf-8")
+    found = gathered(read_manifest(study / "manifest.toml").cases, Config(), Store(None), lambda _: None)
+    assert [case.id for case in found.cases] == ["a"]
+    (said,) = found.left_out
+    assert said.startswith(f"b: left out: 3 frames counted already: frame 0 is traced to within {off_mm:.2g} mm of a ")
+    assert "frame of case 'a'" in said
+
+
+def test_a_frame_that_two_cases_have_counts_once(study):
+    text = STUDY.replace('traces = ["3.csv"]', 'traces = ["2.csv", "3.csv", "4.csv", "5.csv"]')
+    text = text.replace("[8.0, 10.0, 12.0]", "[8.0, 9.0, 10.0]").replace("[9.0]", "[10.0, 11.0, 12.0, 13.0]")
+    text = text.replace('id = "b"', 'id = "b"\nrole = "calibration"')
+    (study / "manifest.toml").write_text(text, encoding="utf-8")
+    for n in range(6):
+        arc = np.linspace(0.0, 8.0 + n, 20)
+        points = np.stack([0.01 * arc**2, 0.0 * arc, arc], axis=1)
+        np.savetxt(study / f"{n}.csv", points, delimiter=",", header="x,y,z", comments="")
+    found = gathered(read_manifest(study / "manifest.toml").cases, Config(), Store(None), lambda _: None)
+    assert [len(trial.seen) for trial in found.trials] == [3, 3]
+    told = "b: 1 frame counted already: frame 0 ends where a frame of case 'a' does, to 0.01 mm; taken once"
+    assert found.warnings == (told,)
 
 
 def test_a_case_does_not_score_itself_under_another_name(study):
@@ -490,7 +632,7 @@ def test_the_verb_writes_what_it_reads(study, capsys):
         assert f"{one.name:20s} {one.used:10g}  +-" in said, "the number that runs take, not one of another fit"
     assert main(["calibrate", str(study / "manifest.toml"), "-o", str(study / "out"), "--no-cache", "-q"]) == 0
     quiet = capsys.readouterr().out.splitlines()
-    told = [line for line in said.splitlines() if not line.startswith(("a: ", "warning"))]
+    told = [line for line in said.splitlines() if not line.startswith(("a: ", "segments of ", "warning"))]
     assert quiet[:-1] == told[:-1], "neither progress nor warnings"
     assert "parameters seen" in quiet[-1]
     page = (study / "out" / "calibration.html").read_text(encoding="utf-8")

@@ -19,7 +19,7 @@ from pipeline.run.stages.given import manifest_clamp
 from pipeline.simulate import together
 from pipeline.simulate.clamp import Prior, TracedFrame, depth_from, estimated_clamp, moved
 from pipeline.simulate.clamp_told import left_out
-from pipeline.simulate.evidence import TraceSamples, posterior, roughness_mm
+from pipeline.simulate.evidence import TraceSamples, posterior, roughness_mm, sigma_across
 from pipeline.simulate.way import Stop, Way
 from solver import GuideWire, Insertion, Solution
 from solver.relax import base_frame
@@ -178,6 +178,13 @@ def test_what_is_held_makes_the_rest_less_certain() -> None:
         off_by.append(true - mean)
         assert mean[0] == mean[3] == 0.0
     np.testing.assert_allclose(spread, np.cov(np.transpose(off_by)), rtol=0.0, atol=0.01)
+
+
+def test_a_trace_is_less_certain_where_it_begins() -> None:
+    """Its variance there is twice that farther on (measured: 1.2 to 2.5 times), over half a knot."""
+    arc = np.array([0.0, 0.7, 7.0])
+    trace = TraceSamples(0, arc, np.zeros((3, 3)), np.full(3, 0.02), knot_mm=1.4)
+    assert sigma_across(trace, 0.3) == pytest.approx(0.02 * np.sqrt([2.0, 1.0 + np.exp(-0.5), 1.0]))
 
 
 def test_a_clamp_far_from_what_the_manifest_says_of_it_is_told_by_what_is_off() -> None:

@@ -12,7 +12,7 @@ from pipeline.arrays.fingerprint import known_by, known_with_place
 from pipeline.arrays.grids import towards_lps
 from pipeline.model import Curve, Volume
 from pipeline.run.stages.known import Frame
-from pipeline.run.stages.repeated import alike, kept, once, rescanned
+from pipeline.run.stages.repeated import alike, copies, kept, once, rescanned, scanned_twice
 
 OBLIQUE = Rotation.from_rotvec([0.1, 0.2, -0.15]).as_matrix()
 
@@ -118,6 +118,23 @@ def test_own_curves_of_the_calibrated_insertion_are_told() -> None:
     again = [traced(0.5, 10 + seed, 20.0 + seed, sigma=np.nan) for seed in range(3)]
     assert "lie where scans that were calibrated with do" in rescanned(again, learnt)[0]
     assert not rescanned([traced(0.5, seed, 40.0 + seed, sigma=np.nan) for seed in range(3)], learnt)
+
+
+@pytest.mark.parametrize("sigma", [SIGMA, np.nan])
+def test_copies_of_another_case_are_known_and_one_wire_scanned_twice_is_doubted(sigma: float) -> None:
+    """Counted as two insertions, one made standard deviations smaller by the root of 2."""
+    learnt = [kept(cast(Curve, traced(1.0, seed, 20.0 + seed).curve)) for seed in range(3)]
+    same = [traced(1.0, seed, 20.0 + seed, sigma) for seed in range(3)]
+    found = copies(same, (), learnt, "a frame of case 'a'")
+    assert [*found] == [0, 1, 2]
+    assert found[0].startswith("is traced to within 0 mm of a frame of case 'a'")
+    again = [traced(1.0, 10 + seed, 20.0 + seed, sigma) for seed in range(3)]
+    assert not copies(again, (), learnt, "a frame of case 'a'")
+    (said,) = scanned_twice(again, learnt, "a")
+    assert said.startswith("frames 10, 11, 12 lie where those of case 'a' do, and count as another insertion: if it is")
+    elsewhere = [traced(1.0, seed, 40.0 + seed, sigma) for seed in range(3)]
+    assert not scanned_twice(elsewhere, learnt, "a")
+    assert [*copies([replace(elsewhere[1], voxels="v")], ("v",), learnt, "it")] == [1]
 
 
 def test_own_curves_are_known_by_their_ends_alone() -> None:

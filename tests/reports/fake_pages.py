@@ -75,7 +75,7 @@ def _calibration(folder: Path) -> Path:
         "frames": frames,
         "starts": [[0.5, 57.0]],
         "scale": 1.0,
-        "used": [{"case": "a"}],
+        "used": [{"case": "a", "group": "a"}],
         "warnings": ["the calibrated wires lie 3.0 times as far from the traces as these are taken to be off"],
         "notes": ["a: nothing is known of the wall"],
         "provenance": {"wireval": "0.1.0"},

@@ -10,7 +10,7 @@ import time
 import numpy as np
 import pytest
 
-from solver import Grid, GuideWire, Insertion, Insertions, VesselWall
+from solver import Grid, GuideWire, Insertion, Insertions, Solution, VesselWall
 from solver import _tolerances as tol
 
 STIFF = GuideWire(1.0, 0.18, 10.0)
@@ -89,3 +89,23 @@ def test_wires_in_threads_are_held_until_the_threads_end_however_often_ctrl_c_is
     time.sleep(0.2)
     assert [wire.depth_mm for wire in wires] == depths, "nothing moves when the call has ended"
     assert all(not wire._lock.locked() for wire in wires)
+
+
+def test_wires_with_friction_go_no_further_than_to_their_next_depth() -> None:
+    """Each was taken from its queue before it began, and all were finished: calibrate took 20 s to end."""
+    x, y, _ = np.meshgrid(*(np.arange(-3.0, end, 0.4) for end in (3.0, 3.0, 40.0)), indexing="ij")
+    wall = VesselWall(Grid(np.hypot(x - 0.3, y) - 1.0, [0.4] * 3, [-3.0] * 3), 5.0, 0.1)
+    wires = [Insertion(GuideWire(0.5, 0.18, 1.0), wall, [0, 0, 0], [0, 0, 1]) for _ in range(4)]
+    go = wires[0]._go
+
+    def pressed(depth: float, roll: float) -> Solution:
+        time.sleep(0.1)
+        os.kill(os.getpid(), signal.SIGINT)
+        time.sleep(0.1)
+        return go(depth, roll)
+
+    wires[0]._go = pressed  # type: ignore[method-assign]
+    with pytest.raises(KeyboardInterrupt):
+        Insertions(wires, threads=1).to_depths([0.5, 1.0, 1.5])
+    assert [wire.depth_mm for wire in wires] == [0.5, 0.0, 0.0, 0.0]
+    assert not any(wire._lock.locked() for wire in wires)

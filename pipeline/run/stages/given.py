@@ -1,6 +1,6 @@
 """Inputs of every fit to an insertion: the clamp as the manifest has it, and the traces that can be trusted."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
@@ -48,17 +48,20 @@ def manifest_clamp(run: Context, known: Known) -> tuple[Clamp, Prior, float]:
     return given, Prior(sigma, case.entry_direction_sigma_deg), voxel
 
 
-def trial_of(run: Context, known: Known, frames: Sequence[Frame], *, roll_free: bool, only: int | None = None) -> Trial:
+def trial_of(
+    run: Context, known: Known, frames: Sequence[Frame], *, roll_free: bool, only: Collection[int] | None = None
+) -> Trial:
     """The insertion as calibration takes it: the trusted traces of these frames, along their whole length.
 
-    frames : of the whole insertion.     only : the number of the one frame whose trace is fitted; None is all.
+    frames : of the whole insertion.     only : the numbers of those whose traces are fitted; None is all.
     """
     case = run.case
     given, prior, voxel_mm = manifest_clamp(run, known)
-    trusted = [frame for frame in frames if frame.trusted_curve is not None and only in (None, frame.index)]
+    trusted = [frame for frame in frames if frame.trusted_curve is not None and (only is None or frame.index in only)]
     force = None if case.push_force_N is None else np.array([case.push_force_N[frame.index] for frame in trusted])
     return Trial(
         name=case.id,
+        group=case.group,
         vessel=VesselWall(known.vessel.distance, stiffness_N_mm2=1.0, hull=run.config.solver.hull),
         wire=case.wire,
         wall=case.wall,

@@ -76,16 +76,47 @@ def rescanned(frames: Sequence[Frame], traced_mm: Sequence[ArrayLike]) -> list[s
     traced_mm : points (n, 3) on their traces, as ``kept`` has them. Frames that are traced as one such scan are
     ``repeated`` and not among these.
     """
-    trusted = [_supposed(frame) for frame in frames if frame.trusted_curve is not None]
-    learnt = _learnt(traced_mm)
-    again = [str(frame.index) for frame in trusted if _alike(frame, learnt, ONE_WIRE)]
-    if len(again) < max(LEAST_AGAIN, 0.5 * len(trusted)):
+    again = _again(frames, _learnt(traced_mm), ONE_WIRE)
+    if not again:
         return []
     return [
-        f"frames {listed(again)} lie where scans that were calibrated with do, as one insertion does that is scanned "
-        "again: what has taught the parameters is no test of them; take it out, unless the wire was drawn out and "
-        "pushed in again between the scans"
+        f"frames {listed([*map(str, again)])} lie where scans that were calibrated with do, as one insertion does that "
+        "is scanned again: what has taught the parameters is no test of them; take it out, unless the wire was drawn "
+        "out and pushed in again between the scans"
     ]
+
+
+def copies(
+    frames: Sequence[Frame], voxels: Collection[str], traced_mm: Sequence[ArrayLike], whose: str
+) -> dict[int, str]:
+    """By number the frames that are ``whose``, in other files or a little altered, and in words why.
+
+    voxels : ``Frame.voxels`` of that case.     traced_mm : points (n, 3) on its traces, as ``kept`` has them.
+    """
+    learnt, found = _learnt(traced_mm, whose), dict[int, str]()
+    for frame in frames:
+        if frame.trusted_curve is not None:
+            found[frame.index] = _the_same(frame.voxels, whose) if frame.voxels in voxels else _alike(frame, learnt)
+    return _again(frames, learnt, ALIKE) | {number: why for number, why in found.items() if why}
+
+
+def scanned_twice(frames: Sequence[Frame], traced_mm: Sequence[ArrayLike], case: str) -> list[str]:
+    """A warning where frames to calibrate with lie where those of another case do that is taken for another insertion.
+
+    traced_mm : points (n, 3) on its traces, as ``kept`` has them.
+    """
+    again = _again(frames, _learnt(traced_mm), ONE_WIRE)
+    return [
+        f"frames {listed([*map(str, again)])} lie where those of case {case!r} do, and count as another insertion: "
+        "if it is one that was scanned again, state the same group for both"
+    ] * bool(again)
+
+
+def _again(frames: Sequence[Frame], learnt: Sequence[tuple[str, Array]], sigmas: float) -> dict[int, str]:
+    """By number the frames that lie where others do, and in words where; none where so few are that it is chance."""
+    trusted = [_supposed(frame) for frame in frames if frame.trusted_curve is not None]
+    found = {frame.index: why for frame in trusted if (why := _alike(frame, learnt, sigmas))}
+    return found if len(found) >= max(LEAST_AGAIN, 0.5 * len(trusted)) else {}
 
 
 def _supposed(frame: Frame) -> Frame:
@@ -101,8 +132,8 @@ def kept(curve: Curve) -> Array:
     return at_arc(curve.points_mm, samples(curve.length_mm, STEP_MM))
 
 
-def _learnt(traced_mm: Sequence[ArrayLike]) -> list[tuple[str, Array]]:
-    return [(OF_CALIBRATION, np.asarray(points, dtype=np.float64)) for points in traced_mm]
+def _learnt(traced_mm: Sequence[ArrayLike], whose: str = OF_CALIBRATION) -> list[tuple[str, Array]]:
+    return [(whose, np.asarray(points, dtype=np.float64)) for points in traced_mm]
 
 
 def _the_same(voxels: str, whose: str) -> str:
@@ -123,7 +154,8 @@ def _alike(frame: Frame, earlier: Sequence[tuple[str, Array]], sigmas: float = A
         if math.dist(points[-1], curve.points_mm[-1]) < sigmas * curve.tip_sigma_mm:
             apart = rms(point_to_curve(points, curve.points_mm)[0])
             if apart < near:
-                return f"is traced to within {apart:.2g} mm of {whose} (traces are known to {near / sigmas:.2g} mm)"
+                known = f"traces are known to {near / sigmas:.2g} mm"
+                return f"is traced to within {round(apart, 4):.2g} mm of {whose} ({known})"
     return ""
 
 

@@ -23,7 +23,7 @@ def with_fitted_roll(run: Context, known: Known) -> Known:
         raise StageError(FrameStatus.SIMULATE_FAILED, message)
     # a sensitivity run turns the wire away from what is fitted: its offset is no part of the fit
     frames = [replace(frame, roll_deg=frame.roll_deg - first.roll_deg) for frame in known.frames]
-    trial = trial_of(run, known, frames, roll_free=True, only=first.index)
+    trial = trial_of(run, known, frames, roll_free=True, only={first.index})
     found = own_roll(Evidence(trial), case.wall.friction, run.config.solver)
     log.assumptions.append(
         f"the roll was fitted on frame {first.index}, which is not scored: {found.roll_deg:.1f} degrees "
