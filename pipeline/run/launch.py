@@ -6,7 +6,6 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass, replace
-from glob import escape
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +14,7 @@ from pipeline.run.aggregate import Totals, aggregate
 from pipeline.run.batch import run_all
 from pipeline.run.cache import Store, forget_lumen
 from pipeline.run.case import Job, clear, each_on, finished, run_case
+from pipeline.run.earlier import remove_arrays, remove_others, remove_records
 from pipeline.run.gate import Gate
 from pipeline.run.hashing import file_hash
 from pipeline.run.inputs import stated
@@ -32,7 +32,7 @@ from pipeline.study.manifest import Case, Manifest
 from pipeline.study.same_scans import continued
 from pipeline.study.settings import to_toml
 from reports.atomic import WriteError, remove_leftovers, write_text, writing
-from reports.case_files import counted, left_over, provenance_of
+from reports.case_files import counted, provenance_of
 from reports.doubts import AMONG
 from reports.gates import GATES
 from reports.records import read_json
@@ -159,7 +159,7 @@ def launch(plan: Plan) -> tuple[Totals, Path]:
     info |= {"to_score": {case.id: case.frames_to_score for case in plan.manifest.cases if case.frames_to_score}}
     info |= {"fail_if": [gate.text for gate in plan.gates]}
     name = f"run.{plan.shard.replace('/', '-')}.json" if plan.shard else "run.json"
-    _remove_arrays(out, name)
+    remove_arrays(out, name)
     info |= {"left_out": _never_asked(out / name, plan.left_out), "config": settings.as_dict()}
     try:
         write_json(out / name, info | {"cases": []})
@@ -172,9 +172,9 @@ def launch(plan: Plan) -> tuple[Totals, Path]:
     for earlier in OVER_ALL:
         (out / earlier).unlink(missing_ok=True)
     if plan.template.fresh:
-        _remove_others(out, info["manifest_sha256"])
+        remove_others(out, info["manifest_sha256"])
     elif not plan.shard and not plan.left_out:
-        _remove_records(out, info["manifest_sha256"])
+        remove_records(out, info["manifest_sha256"])
     _refuse(plan)
     run_cases(plan, [*plan.jobs, *plan.sweep_jobs])
     if removed := write_sweep(out, found_heads(out), earlier=swept):  # points of other shards so far included
@@ -203,44 +203,6 @@ def _never_asked(info: Path, left_out: Sequence[str]) -> list[str]:
         before = read_json(info)
     asked = set(before.get("planned") or ()) - set(before.get("left_out") or ())
     return [name for name in left_out if name not in asked]
-
-
-def _remove_arrays(out: Path, name: str) -> None:
-    """Remove what shards of arrays of another size say of themselves: their cases are computed anew, or kept, by this.
-
-    name : of this run's record.
-    """
-    size = name.rpartition("-")[2]
-    for path in out.glob("run.*-*.json") if "-" in name else ():
-        if not path.name.endswith(f"-{size}"):
-            path.unlink()
-
-
-def _remove_records(out: Path, manifest: str) -> None:
-    """Remove what runs of other manifests say of themselves: shards, once all cases of another one were run.
-
-    And what is damaged, which would keep pages from being drawn.
-    """
-    for path in out.glob("run*.json"):
-        whose = ""
-        with suppress(ValueError):
-            whose = read_json(path).get("manifest_sha256", "")
-        if whose != manifest:
-            path.unlink()
-
-
-def _remove_others(out: Path, manifest: str) -> None:
-    """Remove what runs of other manifests have left in an output folder: their records, and cases that they alone had.
-
-    manifest : SHA-256 of the manifest whose runs stay.
-    """
-    _remove_records(out, manifest)
-    for folder in left_over(out):
-        for place in (folder, *out.glob(f"sweep/*/cases/{escape(folder.name)}")):
-            clear(place)
-            (place / "log.txt").unlink(missing_ok=True)
-            with suppress(OSError):  # something of the user's own lies in it
-                place.rmdir()
 
 
 def cores_each(plan: Plan, jobs: int) -> int:

@@ -1,0 +1,47 @@
+"""What earlier runs have left in an output folder and a new one removes: records, and cases of other manifests."""
+
+from contextlib import suppress
+from glob import escape
+from pathlib import Path
+
+from pipeline.run.case import clear
+from reports.case_files import left_over
+from reports.records import read_json
+
+
+def remove_arrays(out: Path, name: str) -> None:
+    """Remove what shards of arrays of another size say of themselves: their cases are computed anew, or kept, by this.
+
+    name : of this run's record.
+    """
+    size = name.rpartition("-")[2]
+    for path in out.glob("run.*-*.json") if "-" in name else ():
+        if not path.name.endswith(f"-{size}"):
+            path.unlink()
+
+
+def remove_records(out: Path, manifest: str) -> None:
+    """Remove what runs of other manifests say of themselves: shards, once all cases of another one were run.
+
+    And what is damaged, which would keep pages from being drawn.
+    """
+    for path in out.glob("run*.json"):
+        whose = ""
+        with suppress(ValueError):
+            whose = read_json(path).get("manifest_sha256", "")
+        if whose != manifest:
+            path.unlink()
+
+
+def remove_others(out: Path, manifest: str) -> None:
+    """Remove what runs of other manifests have left in an output folder: their records, and cases that they alone had.
+
+    manifest : SHA-256 of the manifest whose runs stay.
+    """
+    remove_records(out, manifest)
+    for folder in left_over(out):
+        for place in (folder, *out.glob(f"sweep/*/cases/{escape(folder.name)}")):
+            clear(place)
+            (place / "log.txt").unlink(missing_ok=True)
+            with suppress(OSError):  # something of the user's own lies in it
+                place.rmdir()
