@@ -413,12 +413,14 @@ def test_a_run_takes_the_parameters(study):
 def test_the_budget_is_told_how_well_what_was_seen_is_known(study):
     rows = "".join(
         f'[[estimate]]\nname = "{name}"\nvalue = 1.0\nsd = 0.1\nlogarithmic = true\nseen = {seen}\nused = 1.0\n'
-        for name, seen in (("rest_curvature", "true"), ("wall:7", "true"), ("friction", "false"), ("wall:2", "true"))
+        for name, seen in (("wall:7", "true"), ("friction", "false"), ("wall:2", "true"))
     )
     text = (study / "p.toml").read_text(encoding="utf-8")
-    (study / "p.toml").write_text(text.partition("[[estimate]]")[0] + rows, encoding="utf-8")
+    (study / "p.toml").write_text(text.replace("[[used]]", f"{rows}[[used]]"), encoding="utf-8")
     (case,), _ = as_calibrated(read_manifest(study / "manifest.toml").cases, study / "p.toml")
-    assert case.calibrated_sigma == {"rest_curvature": 0.1, "wall_stiffness": 0.1}, "its own wall; nothing of the taper"
+    assert case.calibrated_sigma == {"rest_curvature": 0.01, "wall_stiffness": 0.1}, (
+        "its own wall; nothing of the taper"
+    )
 
 
 def test_a_friction_that_was_not_seen_stays_as_the_case_states_it(study):
