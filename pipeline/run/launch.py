@@ -6,6 +6,7 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,7 @@ from pipeline.run.inputs import stated
 from pipeline.run.log import last_stage
 from pipeline.run.occupied import owner_of
 from pipeline.run.outcome import Outcome
+from pipeline.run.own import refuse_scripts, registered, with_own
 from pipeline.run.provenance import code_state, this_run
 from pipeline.run.results import lost, write_json
 from pipeline.run.sweep import SweepPoint, found_heads, heads_of, lost_points, write_sweep
@@ -102,6 +104,12 @@ class Plan:
             for point in self.points
         ]
 
+    @property
+    def elsewhere(self) -> bool:
+        """Whether cases run in other processes than this one; see ``run_all``."""
+        count = len(self.cases) * (1 + len(self.points))
+        return bool(self.address) or self.limits.any or (self.workers > 1 and count > 1)
+
 
 def without(plan: Plan, faults: Mapping[str, Sequence[str]]) -> Plan:
     """The plan with the cases of these ids refused. faults : what is wrong with each, lines that name the case."""
@@ -150,6 +158,8 @@ def imports_set_aside() -> Iterator[None]:
 @imports_set_aside()
 def launch(plan: Plan) -> tuple[Totals, Path]:
     """Run all cases and write the files about the whole run; returns the totals and the path of its page."""
+    if plan.elsewhere:
+        refuse_scripts(registered())
     out, settings, manifest = plan.out, plan.template.settings, plan.manifest.path
     info: dict[str, Any] = {"manifest": str(manifest), "manifest_sha256": file_hash(manifest)}
     heads = heads_of(settings, plan.cases, plan.points)
@@ -220,7 +230,8 @@ def run_cases(plan: Plan, jobs: Sequence[Job]) -> None:
     watch = Watch(jobs, silent=plan.template.quiet, lines=plan.template.verbose)
     cores = cores_each(plan, len(jobs))
     quiet = [replace(job, quiet=job.quiet or watch.bar, cores=cores) for job in jobs]
-    outcomes = run_all(quiet, run_case, plan.workers, plan.address, plan.limits)
+    work = partial(with_own, registered(), run_case) if plan.elsewhere else run_case
+    outcomes = run_all(quiet, work, plan.workers, plan.address, plan.limits)
     with watch.shown(), closing(outcomes):
         for outcome in outcomes:
             if outcome.status == "unwritable":

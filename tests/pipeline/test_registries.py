@@ -19,6 +19,8 @@ from pipeline.compare.nulls import Clues, PredictorInputs
 from pipeline.model import Array
 from pipeline.run import ledger
 from pipeline.run.case import Job, finished
+from pipeline.run.own import refuse_scripts, registered, with_own
+from pipeline.status import UsageError
 from pipeline.study.manifest import read_manifest
 from pipeline.study.settings import resolve
 from reports.schema import ERRORS, SUMMARY, Column
@@ -53,6 +55,19 @@ def test_results_of_own_functions_are_not_kept(as_before: None, tmp_path: Path) 
     assert finished(job, "key")
     metrics.register(Column("own_mm", "mm", "mine"), partial(metrics.distal_rms, length_mm=5.0))
     assert not finished(job, "key")
+
+
+def test_workers_have_what_a_module_registers_or_it_is_refused(as_before: None) -> None:
+    """Their column was empty, and the run ok without a word."""
+    metrics.register(Column("own_mm", "mm", "mine"), float)  # type: ignore[arg-type]
+    own = registered()
+    assert own == {"own_mm": "builtins"}
+    assert with_own(own, abs, -2) == 2
+    with pytest.raises(RuntimeError, match="other_mm: not registered when math is imported"):
+        with_own({"other_mm": "math"}, abs, -2)
+    refuse_scripts(own)
+    with pytest.raises(UsageError, match="own_mm: registered in a script or a notebook"):
+        refuse_scripts({"own_mm": "__main__"})
 
 
 @pytest.mark.parametrize("told", ["its tip", ""])

@@ -1,0 +1,37 @@
+"""Metrics and predictors of a user's own where cases run in processes that this one did not fork."""
+
+import importlib
+from collections.abc import Callable, Mapping
+from typing import TypeVar
+
+from pipeline.status import UsageError
+from reports.case_files import listed
+from reports.schema import ERRORS
+
+J = TypeVar("J")
+R = TypeVar("R")
+SCRIPTS = "__main__", "?"
+DO = "register it at the top level of a module that workers can import, or run with one job (-j 1, no --executor)"
+
+
+def registered() -> dict[str, str]:
+    """The columns that were registered, each with the module that did."""
+    return {column.name: column.module for column in ERRORS if column.module}
+
+
+def refuse_scripts(own: Mapping[str, str]) -> None:
+    """Refuse, for workers, what a script or a notebook has registered: its column would be empty."""
+    alone = [name for name, module in own.items() if module in SCRIPTS]
+    if alone:
+        raise UsageError([f"{listed(alone)}: registered in a script or a notebook, which workers do not run; {DO}"])
+
+
+def with_own(own: Mapping[str, str], work: Callable[[J], R], job: J) -> R:
+    """Do a job where ``own`` is registered; RuntimeError where importing its modules does not do that."""
+    for module in dict.fromkeys(own.values()):
+        importlib.import_module(module)
+    if missing := own.keys() - registered().keys():
+        raise RuntimeError(
+            f"{listed(sorted(missing))}: not registered when {listed([*own.values()])} is imported; {DO}"
+        )
+    return work(job)
