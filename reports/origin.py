@@ -83,11 +83,11 @@ def why_not_pooled(*outs: Path) -> str:
 
 def _of_other_arrays(out: Path) -> str:
     """The sentence on shards of several arrays that were merged: a case may be what an earlier one made of it."""
-    counts = {path.stem.rpartition("-")[2] for path in out.glob("run.*-*.json")}
-    if len(counts) < 2:
+    sizes = {int(size) for path in out.glob("run.*-*.json") if (size := path.stem.rpartition("-")[2]).isdecimal()}
+    if len(sizes) < 2:
         return ""
-    sizes = " and of ".join(sorted(counts, key=int))
-    what = f"Nothing is pooled: shards of arrays of {sizes} were merged, and a case may be of the earlier one"
+    counts = " and of ".join(map(str, sorted(sizes)))
+    what = f"Nothing is pooled: shards of arrays of {counts} were merged, and a case may be of the earlier one"
     return f"{what}; merge the folders of one array, into an empty one."
 
 

@@ -39,7 +39,8 @@ SOURCES = (
 class Sigmas:
     """One standard deviation of every input.
 
-    clamp : (6, 6) covariance, see ``Clamp``.     depth : (stops,), mm.     said : by source, in words.
+    clamp : (6, 6) covariance, see ``Clamp``.     depth : (stops,), mm, of each by itself; depth_common : of all that
+    are stated, together.     said : by source, in words.
     lumen, lumen_bias in mm, roll in degrees, the others as of ``Uncertainty``.
     """
 
@@ -53,6 +54,7 @@ class Sigmas:
     wall_stiffness: float
     friction: float
     said: dict[str, str]
+    depth_common: float = 0.0
 
 
 class Nominal(NamedTuple):
@@ -121,8 +123,10 @@ def sigmas_of(
     said["clamp"] = f"{clamp.sigma_mm:.3f} mm across and {clamp.sigma_deg:.2f} degrees" if known else "exact"
     kinds = (("traced", depth_mm[nominal.traced]), ("manifest", depth_mm[~nominal.traced]))
     said["depth"] = " and ".join(f"{float(np.median(some)):.2f} mm, {kind}" for kind, some in kinds if len(some))
+    if (common := found.get("insertion_mm", 0.0)) and not nominal.traced.all():
+        said["depth"] += f"; {common:.2f} mm, common, calibrated"
     covariance = np.array(clamp.covariance) if known else np.zeros((6, 6))
-    return Sigmas(covariance, depth_mm, **values, said=said)
+    return Sigmas(covariance, depth_mm, **values, said=said, depth_common=common)
 
 
 def _known(stated: float | None, calibrated: float | None, default: float, *, both: bool) -> tuple[float, str]:
@@ -162,6 +166,7 @@ def drawn(nominal: Nominal, sigmas: Sigmas, count: int, per_lumen: int, seed: in
             wall_scale=old.wall_scale * float(np.exp(sigmas.wall_stiffness * wall)),
             friction=max((old.friction or 0.0) + sigmas.friction * friction, 0.0),
         )
+        depth = depth + sigmas.depth_common * rng.standard_normal() * ~nominal.traced
         bias, rolls = sigmas.lumen_bias * narrower, nominal.roll_deg + sigmas.roll * roll
         surface = number // per_lumen if sigmas.lumen else 0
         members.append(Member(clamp, np.maximum(depth, 0.1), rolls, config, bias, surface, sigmas.lumen))
@@ -179,10 +184,11 @@ def _moved(clamp: Clamp, covariance: Array, rng: np.random.Generator) -> tuple[C
 
 def alone(sigmas: Sigmas, source: str) -> Sigmas:
     """The standard deviations with all inputs but one exact; draws of that one stay the same."""
-    return replace(exact(sigmas), **{source: getattr(sigmas, source)})
+    kept = (source, "depth_common") if source == "depth" else (source,)
+    return replace(exact(sigmas), **{name: getattr(sigmas, name) for name in kept})
 
 
 def exact(sigmas: Sigmas) -> Sigmas:
     """The standard deviations with all inputs exact."""
-    none: dict[str, Any] = {name: 0.0 * getattr(sigmas, name) for name in SOURCES}
+    none: dict[str, Any] = {name: 0.0 * getattr(sigmas, name) for name in (*SOURCES, "depth_common")}
     return replace(sigmas, **none)

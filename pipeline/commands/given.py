@@ -2,6 +2,7 @@
 
 import argparse
 import atexit
+import re
 import shutil
 import tempfile
 from pathlib import Path
@@ -89,7 +90,7 @@ def given(args: argparse.Namespace, keep: Path | None = None) -> "Manifest":
 
 def _is_manifest(file: Path) -> bool:
     """Whether a TOML file states cases: one that was inferred from the scans beside it would be judged instead."""
-    return b"[[case]]" in file.read_bytes()[:TEXT_BYTES]
+    return file.is_file() and re.search(rb"^\s*\[\[\s*case\s*\]\]", file.read_bytes()[:TEXT_BYTES], re.M) is not None
 
 
 def _other_manifests(folder: Path) -> list[str]:

@@ -1,12 +1,17 @@
 """The order in which people number things: frame_2 before frame_10, d25 before d25.5, in whatever folder or dataset."""
 
 import re
-from collections.abc import Callable, Iterable
+from collections import defaultdict
+from collections.abc import Callable, Collection, Iterable, Iterator
+from itertools import pairwise
+from statistics import fmean, pstdev
 from typing import Any, TypeVar
 
 T = TypeVar("T")
-_DECIMAL = r"(?<![0-9])(?<![0-9][.,])([0-9]+)[.,]([0-9]+)(?![.,]?[0-9])"
-"""A number with one point in it: 1.2.840 has two and is none, as is a date."""
+_NUMBER = re.compile(r"(?<![0-9])(?<![0-9][.,])([0-9]+)[.,]([0-9]+)(?![.,]?[0-9])|([0-9]+)")
+"""With one point in it, or without: 1.2.840 has two and is three numbers, as is a date."""
+Place = tuple[int, int]
+"""Of a number in a name: the part of the path, and which of that part's numbers it is."""
 
 
 def in_order(items: Iterable[T], name: Callable[[T], str] = str) -> list[T]:
@@ -15,31 +20,54 @@ def in_order(items: Iterable[T], name: Callable[[T], str] = str) -> list[T]:
     A number with a point is a decimal (d25, d25.25, d25.5), except where names count beyond the point (1.9, 1.10).
     """
     named = [(name(item), item) for item in items]
-    number = "([0-9]+)()" if _counted([text for text, _ in named]) else f"{_DECIMAL}|([0-9]+)"
-    return [item for _, item in sorted(named, key=lambda one: _key(one[0], re.compile(number)))]
+    counted = _counted([text for text, _ in named])
+    return [item for _, item in sorted(named, key=lambda one: _key(one[0], counted))]
 
 
-def _counted(texts: list[str]) -> bool:
-    """Whether points separate counts: some have fewer digits after them than others that end in 0.
-
-    Nobody writes 1.10 beside 1.9 who means a tenth.
-    """
-    after = [digits for text in texts for _, digits in re.findall(_DECIMAL, text)]
-    most = max(map(len, after), default=0)
-    return any(len(digits) < most for digits in after) and any(d.endswith("0") for d in after if len(d) == most)
+def _numbers(text: str) -> Iterator[tuple[Place, str, str]]:
+    """The numbers of a name: place, digits before the point, and after it."""
+    for part, words in enumerate(text.split("/")):
+        for n, found in enumerate(_NUMBER.finditer(words)):
+            yield (part, n), found[1] or found[3], found[2] or ""
 
 
-def _key(text: str, number: re.Pattern[str]) -> tuple[Any, ...]:
+def _counted(texts: Iterable[str]) -> set[Place]:
+    """The places at which points separate counts: there these are more evenly apart than decimals would be."""
+    seen: dict[Place, dict[str, set[str]]] = defaultdict(lambda: defaultdict(set))
+    for text in texts:
+        for place, whole, after in _numbers(text):
+            seen[place][whole].add(after)
+    return {place for place, numbers in seen.items() if _counts(numbers.values())}
+
+
+def _counts(each: Collection[set[str]]) -> bool:
+    """Whether what follows points is counted. each : the digits after them, of every number before them."""
+    digits = set().union(*each)
+    # nobody counts 25, 25.5 or writes 1.05 for the fifth; where all have as many digits both are in one order
+    if any(d == "" or (len(d) > 1 and d[0] == "0") for d in digits) or len({*map(len, digits)}) < 2:
+        return False
+    counts, decimals = ([_uneven([*map(read, some)]) for some in each] for read in (int, lambda d: float(f"0.{d}")))
+    return sum(counts) < sum(decimals) or (counts == decimals and any(d[-1] == "0" for d in digits))
+
+
+def _uneven(values: list[float]) -> float:
+    """The spread of the steps between values, over their mean."""
+    steps = [b - a for a, b in pairwise(sorted(values))]
+    return pstdev(steps) / fmean(steps) if steps else 0.0
+
+
+def _key(text: str, counted: set[Place]) -> tuple[Any, ...]:
     """Sort key, part by part of a path; the text itself decides between f1 and f01."""
-    return tuple(_of_part(part, number) for part in text.split("/")), text
+    return tuple(_of_part(n, part, counted) for n, part in enumerate(text.split("/"))), text
 
 
-def _of_part(part: str, number: re.Pattern[str]) -> tuple[tuple[str, int, str, str], ...]:
+def _of_part(number: int, part: str, counted: set[Place]) -> tuple[tuple[str, int, str, Any], ...]:
     """Each number with the text before it: compared by its count of digits, by these, and by those after a point."""
-    pieces, done = [], 0
-    for found in number.finditer(part):
-        whole, after, *alone = found.groups(default="")
-        digits = (whole or alone[0]).lstrip("0")
-        pieces.append((part[done : found.start()], len(digits), digits, after.rstrip("0")))
+    pieces: list[tuple[str, int, str, Any]] = []
+    done = 0
+    for n, found in enumerate(_NUMBER.finditer(part)):
+        digits, after = (found[1] or found[3]).lstrip("0"), found[2] or ""
+        beyond = int(after or "0") if (number, n) in counted else float(f"0.{after}0")
+        pieces.append((part[done : found.start()], len(digits), digits, beyond))
         done = found.end()
-    return (*pieces, (part[done:], -1, "", ""))
+    return (*pieces, (part[done:], -1, "", 0))

@@ -17,7 +17,7 @@ def remove_arrays(out: Path, name: str) -> None:
     size = name.rpartition("-")[2]
     for path in out.glob("run.*-*.json") if "-" in name else ():
         if not path.name.endswith(f"-{size}"):
-            path.unlink()
+            path.unlink(missing_ok=True)  # another shard may be at it, too
 
 
 def remove_records(out: Path, manifest: str) -> None:

@@ -144,9 +144,11 @@ def times_of(case: Case) -> dict[str, int]:
 
 
 def _changed(path: Path) -> int:
-    """When a file, or any of a folder or behind a header, was last written or put in its place, ns from 1970."""
-    stats = [file.stat() for file in _with_parts(path) if file.exists()]
-    return max((max(stat.st_mtime_ns, stat.st_ctime_ns) for stat in stats), default=0)
+    """When a file, or any of a folder or behind a header, was last written or put in its place, ns from 1970.
+
+    That of its entry, which nobody can put back, as that of the content may be.
+    """
+    return max((file.stat().st_ctime_ns for file in _with_parts(path) if file.exists()), default=0)
 
 
 def _size(path: Path) -> int:

@@ -55,8 +55,13 @@ def on_frames(found: Sequence[Found], frames: Set[tuple[str, int]]) -> list[Foun
 
 
 def golden_cases(out: Path) -> list[Found]:
-    """Every case of a baseline folder, which keeps errors.csv and points.csv.gz alone and no result."""
-    folders = [f for f in find_cases(out) if (f / POINTS.file).exists() and not (f / ledger.RESULT).exists()]
+    """Every case of a baseline folder, which keeps errors.csv and points.csv.gz alone and no result.
+
+    Where none has points frames alone can be held against; where some have, one without is damaged.
+    """
+    folders = [f for f in find_cases(out) if not (f / ledger.RESULT).exists()]
+    if not any((folder / POINTS.file).exists() for folder in folders):
+        return []
     return [_found(out, untold(folder.name), folder.name) for folder in folders]
 
 
@@ -129,11 +134,18 @@ def _found(out: Path, result: Result, insertion: str) -> Found:
 def _scored(folder: Path, result: Result, insertion: str) -> tuple[dict[int, Scored], dict[int, float]]:
     """The frames that count, and the depths of those whose trace is trusted."""
     if not (folder / ERRORS.file).exists():
+        if (folder / POINTS.file).exists():
+            raise ValueError(f"{folder / ERRORS.file}: no such file, though {POINTS.file} is there; copy it again")
         return {}, {}
     points, errors = tables.read_if_there(folder / POINTS.file, POINTS), tables.read(folder / ERRORS.file, ERRORS)
     frame, error, arc = (points[name].to_numpy(dtype=float) for name in ("frame", "error_mm", "arc_mm"))
     if errors["frame"].isna().any() or not {*np.unique(frame)} <= {*errors["frame"]}:
         raise ValueError(f"{folder / ERRORS.file}: not every frame that {POINTS.file} has points of; copy it again")
+    bare = errors.loc[errors["rms_mm"].notna() & ~errors["frame"].isin(frame[np.isfinite(error)]), "frame"]
+    if len(bare):
+        raise ValueError(
+            f"{folder / POINTS.file}: no points of frame {bare.iloc[0]}, which has an error; copy it again"
+        )
     own = {number: frame == number for number in errors["frame"]}
     # field by field: pandas takes ten times as long for the few rows of a case
     rows = [{str(k): None if v is pd.NA or v != v else v for k, v in row.items()} for row in errors.to_dict("records")]

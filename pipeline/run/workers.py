@@ -151,7 +151,9 @@ def _start_server() -> None:
     before = {name: os.environ.get(name) for name in (*THREADS, *PATHS)}
     one_thread()
     # Python would look in the working folder first, where a user's own pipeline.py may lie
-    os.environ.update(PYTHONSAFEPATH="1", PYTHONPATH=os.pathsep.join(filter(None, sys.path)))
+    os.environ.update(
+        PYTHONSAFEPATH="1", PYTHONPATH=os.pathsep.join(path for path in sys.path if isinstance(path, str) and path)
+    )
     try:
         multiprocessing.get_context("forkserver").set_forkserver_preload([FIRST, PRELOADED])
         resource_tracker.ensure_running()  # it lets signals through again

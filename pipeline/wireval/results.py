@@ -155,7 +155,7 @@ def _alike(row: Mapping[Any, Any], other: Mapping[str, Any]) -> bool:
 def wall_of(case: CaseFiles) -> VesselWall:
     """The wall that a case was simulated in, for the solver alone; raises InputError where the case left no lumen.
 
-    Made from the surface in ``view/lumen.vtp``, with the stiffness and friction that result.json has. Wires replayed in
+    Made from the surface in ``view/lumen.vtp``, with the stiffness and friction of the run. Wires replayed in
     it lie within a tenth of a voxel of the run's own, rms: 0.04 mm in voxels of 0.5 mm. In the distance made from
     ``view/lumen.seg.nrrd`` they lie up to 0.5 mm off, since a label map is a staircase.
     """
@@ -167,7 +167,13 @@ def wall_of(case: CaseFiles) -> VesselWall:
     if not surface.is_file():
         raise InputError([f"{surface}: no such file; the case left no lumen, or view/ was not kept: run it again"])
     lumen = given_lumen(read_lumen(surface, config.least_voxels), config)
-    return VesselWall(lumen.distance, **case.result["wall"])
+    stated, given = case.result["wall"], case.result["config"]["simulate"]
+    friction = given["friction"]["value"]
+    return VesselWall(
+        lumen.distance,
+        stated["stiffness_N_mm2"] * given["wall_scale"]["value"],
+        stated["friction"] if friction is None else friction,
+    )
 
 
 def read_run(out: Path) -> Results:

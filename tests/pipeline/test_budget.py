@@ -155,6 +155,20 @@ def test_what_a_calibration_found_is_drawn_where_nothing_is_stated() -> None:
     assert (known.rest_curvature, known.said["rest_curvature"]) == (0.02, "0.02 (relative), calibrated")
     assert known.roll == pytest.approx(np.hypot(ROLL_DEG, 3.0)), "its own error, and that of the common offset"
     assert known.said["roll"].endswith("degrees, default and calibrated")
+
+
+def test_a_calibrated_offset_of_depths_is_one_for_all_frames() -> None:
+    """Drawn for each frame anew, an offset of 1 mm made steps of 1.4 mm between them."""
+    stated = nominal(traced=False)
+    known = sigmas_of({}, stated, WIRE, np.full(2, 0.1), 0.3, calibrated={"insertion_mm": 1.0})
+    assert known.said["depth"].endswith("; 1.00 mm, common, calibrated")
+    for sigmas_ in (known, alone(known, "depth")):
+        depths = np.array([member.depth_mm for member in drawn(stated, sigmas_, 200, 1)])
+        assert np.std(depths, axis=0) == pytest.approx(1.0, rel=0.15)
+        assert np.std(depths[:, 1] - depths[:, 0]) == pytest.approx(0.14, rel=0.15)
+    assert {member.depth_mm[0] for member in drawn(stated, exact(known), 9, 1)} == {10.0}
+    traced = sigmas_of({}, nominal(), WIRE, np.full(2, 0.1), 0.3, calibrated={"insertion_mm": 1.0})
+    assert np.ptp([member.depth_mm[0] for member in drawn(nominal(), traced, 50, 1)]) < 2.0, "mm: the traces' are not"
     assert (known.friction, known.said["friction"]) == (0.05, "0.05, stated")
     assert known.said["taper"].endswith("default")
 

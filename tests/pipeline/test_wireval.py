@@ -96,6 +96,10 @@ def test_a_run_gives_frames(study: Path, tmp_path: Path) -> None:
     assert re.match(r"FrameArrays\(frame 1, traced_mm \(\d+, 3\), ", repr(results.cases["straight"].read_frame(1)))
     assert wireval.read_results(tmp_path / "out").errors.equals(results.errors)
     assert replayed_mm(results.cases["straight"]) < 0.08, "0.1 voxel; there was no way from a run to its wall"
+    changed, settings = results.cases["straight"], results.cases["straight"].result["config"]["simulate"]
+    settings["wall_scale"]["value"], settings["friction"]["value"] = 3.0, 0.2
+    wall, stated = wireval.wall_of(changed), changed.result["wall"]
+    assert (wall.stiffness_N_mm2, wall.friction) == (3.0 * stated["stiffness_N_mm2"], 0.2), "of the run, not as stated"
     table = tmp_path / "out" / "cases" / "straight" / "errors.csv"
     table.write_text(table.read_text(encoding="utf-8").replace("0.1", "0.01"), encoding="utf-8")
     with pytest.warns(UserWarning, match="errors.csv is not as it was written"):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import json
 import re
 import shutil
@@ -316,14 +317,16 @@ def test_golden_tables_alone_are_enough(
 POINTER = b"version https://git-lfs.github.com/spec/v1\noid sha256:4d7a21\nsize 12345\n"
 SPOILT = {
     "cut": lambda whole: whole[:-60], "altered": lambda whole: whole[:99] + bytes([255]) * 99 + whole[198:],
-    "pointer": lambda _: POINTER, "empty": lambda _: b"", "rows": lambda whole: b"".join(whole.splitlines(True)[:-1]),
+    "pointer": lambda _: POINTER, "empty": lambda _: b"",
+    "bare": lambda whole: gzip.compress(gzip.decompress(whole).splitlines(True)[0]),
+    "rows": lambda whole: b"".join(whole.splitlines(True)[:-1]),
 }  # fmt: skip
 
 
 @pytest.mark.parametrize(
     ("file", "spoil"),
-    [*((POINTS.file, how) for how in ("cut", "altered", "pointer", "empty"))]
-    + [(ERRORS.file, how) for how in ("pointer", "rows")],
+    [*((POINTS.file, how) for how in ("cut", "altered", "pointer", "empty", "bare", "gone"))]
+    + [(ERRORS.file, how) for how in ("pointer", "rows", "gone")],
 )
 def test_damaged_golden_tables_are_refused(
     first: Path, second: Path, tmp_path: Path, file: str, spoil: str, capsys: pytest.CaptureFixture[str]
@@ -331,7 +334,10 @@ def test_damaged_golden_tables_are_refused(
     """What could not be read was left out, and a gate that was closed opened with it."""
     golden = shutil.copytree(first, tmp_path / "golden", ignore=lambda *_: {*ledger.DATA, ledger.FILE} - set(GOLDEN))
     path = golden / "cases" / "b" / file
-    path.write_bytes(SPOILT[spoil](path.read_bytes()))
+    if spoil == "gone":
+        path.unlink()
+    else:
+        path.write_bytes(SPOILT[spoil](path.read_bytes()))
     assert main(["diff", str(golden), str(second)]) == 2
     said = capsys.readouterr().err
     assert str(path) in said

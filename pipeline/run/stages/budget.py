@@ -172,10 +172,10 @@ class Work:
 
     def _depth_sigmas(self, stops: Sequence[Frame]) -> Array:
         """Standard deviation (stops,) of the depth of each frame on the way, mm."""
-        given, offset = self.run.case.insertion_sigma_mm, self.run.case.calibrated_sigma.get("insertion_mm", 0.0)
+        given = self.run.case.insertion_sigma_mm
         tips = [0.0 if f.curve is None else np.nan_to_num(f.curve.tip_sigma_mm) for f in stops]
         own = np.hypot(tips, TIP_VOXELS * self.voxel)
-        return np.where(self.nominal.traced, own, np.hypot(INSERTION_MM if given is None else given, offset))
+        return np.where(self.nominal.traced, own, INSERTION_MM if given is None else given)
 
     def _seen(self, frame: Frame) -> FrameSample:
         """A frame's wires at the points at which it was compared."""

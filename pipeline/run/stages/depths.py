@@ -33,6 +33,8 @@ LEAST_VOXELS = 3.0
 """Third limit, voxels: a length is out of step beyond all three. Also the least shrinking that gets a warning."""
 APART = 2.0
 """Standard deviations of two tips from which their distance is not the stated one: by chance one step in 44."""
+SURELY = 6.0
+"""Standard deviations from which a single such step is told: two frames of thirty that are exchanged are 9 apart."""
 LEAST_SCALE, CHANCE = 0.01, 1e-3
 """By how much a scale must be off to be told, and how often right depths may seem as wrong."""
 
@@ -199,14 +201,16 @@ def drawn_back(frames: Sequence[Frame], voxel_mm: float) -> list[str]:
     Frames half a millimetre apart that are exchanged in pairs are off by less than any tolerance of one frame.
     """
     seen = [(f, c) for f in frames if (c := f.trusted_curve) is not None and np.isfinite(f.expected_mm)]
-    odd, count = [], 0
+    odd, count, most = [], 0, 0.0
     for (earlier, before), (later, after) in pairwise(seen):
         stated, traced = later.expected_mm - earlier.expected_mm, after.length_mm - before.length_mm
         count += stated > 0.0
         tips = np.hypot(np.nan_to_num([before.tip_sigma_mm, after.tip_sigma_mm]), TIP_VOXELS * voxel_mm)
-        if traced < 0.0 < stated and stated - traced > APART * np.hypot(*tips):
+        apart = (stated - traced) / np.hypot(*tips)
+        if traced < 0.0 < stated and apart > APART:
             odd.append(f"{later.index} ({traced:+.2f} mm, stated {stated:+.2f} mm)")
-    if not odd or bdtrc(len(odd) - 1, count, ndtr(-APART)) > CHANCE:
+            most = max(most, float(apart))
+    if not odd or (most < SURELY and bdtrc(len(odd) - 1, count, ndtr(-APART)) > CHANCE):
         return []
     return [
         f"frames {listed(odd)}: the traced wire is shorter than in the frame before, where insertion_mm is deeper: are "

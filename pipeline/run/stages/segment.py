@@ -16,6 +16,7 @@ from pipeline.run.projections import slabs
 from pipeline.run.stages.known import Context, Known
 from pipeline.segment import segment
 from pipeline.segment.given import given_lumen
+from pipeline.segment.hollows import hollows
 from pipeline.segment.levels import failed
 from pipeline.segment.opened import outside_mm
 from pipeline.segment.pieces import in_pieces
@@ -33,7 +34,7 @@ def segment_vessel(run: Context, known: Known) -> Known:
             lumen = given_lumen(read_lumen(case.lumen, config.segment.least_voxels), config.segment)
         _require_entry(run, lumen)
         log.assumptions += lumen.warnings
-        log.warnings += in_pieces(lumen.distance, case.entry_mm)
+        log.warnings += in_pieces(lumen.distance, case.entry_mm) + hollows(lumen.distance)
         log.warnings += _held_against(run, known, lumen)
         return replace(known, lumen=lumen)
     assert known.scans is not None
@@ -84,6 +85,9 @@ the solver's to judge."""
 def _require_entry(run: Context, lumen: Lumen) -> None:
     """StageError where the user's own lumen is not where the wire enters: wires would be missed, not the lumen."""
     grid = lumen.distance
+    if not (grid.values < 0.0).any():
+        do = "check whether each of its triangles is there twice, or whether it is much thinner than 0.3 mm"
+        raise failed("the given lumen encloses nothing", "a lumen that the wire enters", do)
     out = float(outside_mm(grid, np.array([run.case.entry_mm]))[0])
     if out > max(FAR_OUTSIDE * float(np.max(grid.spacing_mm)), FAR_OUTSIDE_MM, 2.0 * (run.case.entry_sigma_mm or 0.0)):
         low, high = (corner.round(1).tolist() for corner in _box_of(lumen))
