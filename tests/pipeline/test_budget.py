@@ -156,6 +156,9 @@ def test_what_a_calibration_found_is_drawn_where_nothing_is_stated() -> None:
     assert known.roll == pytest.approx(np.hypot(ROLL_DEG, 3.0)), "its own error, and that of the common offset"
     assert known.said["roll"].endswith("degrees, default and calibrated")
 
+    assert (known.friction, known.said["friction"]) == (0.05, "0.05, stated")
+    assert known.said["taper"].endswith("default")
+
 
 def test_a_calibrated_offset_of_depths_is_one_for_all_frames() -> None:
     """Drawn for each frame anew, an offset of 1 mm made steps of 1.4 mm between them."""
@@ -169,8 +172,6 @@ def test_a_calibrated_offset_of_depths_is_one_for_all_frames() -> None:
     assert {member.depth_mm[0] for member in drawn(stated, exact(known), 9, 1)} == {10.0}
     traced = sigmas_of({}, nominal(), WIRE, np.full(2, 0.1), 0.3, calibrated={"insertion_mm": 1.0})
     assert np.ptp([member.depth_mm[0] for member in drawn(nominal(), traced, 50, 1)]) < 2.0, "mm: the traces' are not"
-    assert (known.friction, known.said["friction"]) == (0.05, "0.05, stated")
-    assert known.said["taper"].endswith("default")
 
 
 def test_a_noisy_scan_has_a_lumen_that_is_less_known() -> None:
