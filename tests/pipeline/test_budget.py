@@ -155,7 +155,6 @@ def test_what_a_calibration_found_is_drawn_where_nothing_is_stated() -> None:
     assert (known.rest_curvature, known.said["rest_curvature"]) == (0.02, "0.02 (relative), calibrated")
     assert known.roll == pytest.approx(np.hypot(ROLL_DEG, 3.0)), "its own error, and that of the common offset"
     assert known.said["roll"].endswith("degrees, default and calibrated")
-
     assert (known.friction, known.said["friction"]) == (0.05, "0.05, stated")
     assert known.said["taper"].endswith("default")
 

@@ -7,22 +7,28 @@ import numpy as np
 
 from pipeline.arrays.grids import corners_mm
 from pipeline.arrays.polyline import at_arc
-from pipeline.compare import Comparison
+from pipeline.compare import Comparison, point_to_curve
 from pipeline.compare.config import CompareConfig
 from pipeline.compare.nulls import NULLS, TOLD, Clues, PredictorInputs
 from pipeline.compare.seen import largest_scale, require_in_order, require_not_longer
 from pipeline.compare.views import Screen, counted, nulls_in, pair_in, screen_of, values_in
 from pipeline.load.views import View
-from pipeline.model import Array
+from pipeline.model import Array, arc_length
 from pipeline.run.stages.known import Context, Frame, Known
 from pipeline.run.stages.variants import simulated_rivals, variant_wires, variants_of
 from pipeline.simulate import wall_of
 from pipeline.status import FrameStatus
 from reports.case_files import counted as number_of
+from reports.case_files import listed
 
 FAR_SHIFT_MM = 10.0
 """A fitted shift beyond which a registration is doubted: a head or a limb moves by some millimetres. A liver moves by
 10 to 20 with every breath, so that this is a word and no failure."""
+
+
+BESIDE_MM, NEARLY = 2.0, 0.75
+"""How far from a polyline its entry is doubted, and from which share of the wire's length on: shorter ones may begin
+farther in."""
 
 
 def compare_in_views(run: Context, known: Known) -> tuple[Frame, ...]:
@@ -42,8 +48,9 @@ def compare_in_views(run: Context, known: Known) -> tuple[Frame, ...]:
         "distances are in the plane through the isocentre, parallel to the detector; each wire, predictors too, was "
         + (how if views[0].fitted else "taken where it lies: no translation was fitted")
     )
-    run.log.warnings += _far_shifts(frames)
+    run.log.warnings += _far_shifts(frames) + _beside_the_entry(frames)
     if not limited:
+        run.log.warnings += [] if clues is None else _odd_views(frames, clues, config)
         return tuple(frames)
     # a wire cannot lie farther from its vessel's middle than the vessel's radius: the rest is a registration error
     run.log.warnings.insert(0, limited)
@@ -105,6 +112,40 @@ def _require_to_depth(frame: Frame, view: View, entry_mm: Array, clues: Clues, t
 def screen_seen(view: View) -> Screen:
     """The plane of a view with the polyline on it."""
     return screen_of(view.matrix, view.isocentre_mm, view.points_px)
+
+
+def _odd_views(frames: Sequence[Frame], clues: Clues, config: CompareConfig) -> list[str]:
+    """A warning of single views in which even the centreline lies farther from the wire than a wire can."""
+    odd = []
+    for frame in frames:
+        if frame.ok and "centreline" in frame.nulls_rms_mm and frame.view is not None:
+            off, radius = frame.nulls_rms_mm["centreline"], float(np.median(_radii(frame, clues, config)))
+            if off > radius * (1.0 + frame.view.fitted):
+                odd.append(f"{frame.index} ({off:.1f} mm in a lumen of {radius:.1f} mm radius)")
+    if not odd:
+        return []
+    return [
+        f"the view of frame {listed(odd)} is perhaps registration-limited: so far is the centreline from the polyline, "
+        "farther than in the other frames and than a wire can be from it; check isocentre_mm, matrix or c_arm, and "
+        "points_px of that frame, which is in all that is pooled"
+    ]
+
+
+def _beside_the_entry(frames: Sequence[Frame]) -> list[str]:
+    """A warning where polylines as long as their wires do not pass the entry, which the manifest knows to a voxel.
+
+    In a wide vessel nothing else tells a geometry that is wrong. A fitted shift moves the entry with all the rest.
+    """
+    known = [f.comparison for f in frames if f.ok and f.comparison and f.view is not None and not f.view.fitted]
+    whole = [c for c in known if arc_length(c.curve_mm)[-1] > NEARLY * arc_length(c.wire_mm)[-1]]
+    off = [float(point_to_curve(c.wire_mm[:1], c.curve_mm)[0][0]) for c in whole]
+    if not off or np.median(off) <= BESIDE_MM:
+        return []
+    return [
+        f"the polylines pass the entry, as it is projected, at {np.median(off):.1f} mm in the median of "
+        f"{number_of(len(off), 'frame')} (doubted from {BESIDE_MM:g} mm on): check isocentre_mm, matrix or c_arm, and "
+        "points_px, unless the polylines begin beyond the entry"
+    ]
 
 
 def _far_shifts(frames: Sequence[Frame]) -> list[str]:
