@@ -102,19 +102,8 @@ def sigmas_of(
     offset, which adds to how far each insertion is turned by mistake.
     """
     found = calibrated or {}
-    noise = LUMEN_NOISE_VOXELS * voxel_mm if noise_mm is None else noise_mm
-    friction = nominal.config.friction or 0.0
-    defaults = {
-        "roll_deg": ROLL_DEG * wire.curved,
-        "lumen_mm": float(np.hypot(LUMEN_VOXELS * voxel_mm, noise)),
-        "lumen_bias_mm": LUMEN_BIAS_VOXELS * voxel_mm,
-        "rest_curvature": REST_CURVATURE * wire.curved,
-        "taper": TAPER * isinstance(wire.bending_stiffness_N_mm2, list),
-        "wall_stiffness": WALL_STIFFNESS,
-        "friction": FRICTION * friction,
-    }
     values, said = {}, {}
-    for name, default in defaults.items():
+    for name, default in _defaults(nominal, wire, voxel_mm, noise_mm).items():
         source = _source(name)
         values[source], told = _known(stated.get(name), found.get(name), default, both=name == "roll_deg")
         said[source] = f"{values[source]:.3g}{UNITS.get(name, ' (relative)')}, {told}"
@@ -127,6 +116,20 @@ def sigmas_of(
         said["depth"] += f"; {common:.2f} mm, common, calibrated"
     covariance = np.array(clamp.covariance) if known else np.zeros((6, 6))
     return Sigmas(covariance, depth_mm, **values, said=said, depth_common=common)
+
+
+def _defaults(nominal: Nominal, wire: Wire, voxel_mm: float, noise_mm: float | None) -> dict[str, float]:
+    """Standard deviations of what is neither stated nor calibrated, by the keys of ``Uncertainty``, and roll_deg."""
+    noise = LUMEN_NOISE_VOXELS * voxel_mm if noise_mm is None else noise_mm
+    return {
+        "roll_deg": ROLL_DEG * wire.curved,
+        "lumen_mm": float(np.hypot(LUMEN_VOXELS * voxel_mm, noise)),
+        "lumen_bias_mm": LUMEN_BIAS_VOXELS * voxel_mm,
+        "rest_curvature": REST_CURVATURE * wire.curved,
+        "taper": TAPER * isinstance(wire.bending_stiffness_N_mm2, list),
+        "wall_stiffness": WALL_STIFFNESS,
+        "friction": FRICTION * (nominal.config.friction or 0.0),
+    }
 
 
 def _known(stated: float | None, calibrated: float | None, default: float, *, both: bool) -> tuple[float, str]:

@@ -60,8 +60,8 @@ def in_pieces(distance: Grid, entry_mm: ArrayLike) -> list[str]:
     return [
         f"segment: the given lumen is in {count} pieces, and no simulated wire goes from one to another: one begins "
         f"{apart[closest]:.1f} mm (between the middles of voxels) from that which the wire enters, near "
-        f"{spelt(middle)} mm; is a slice missing there, or a part of the surface, or do two surfaces overlap? Close the "
-        "gap, or unite them, in the file"
+        f"{spelt(middle)} mm; is a slice missing there, or a part of the surface, or do two surfaces overlap? Close "
+        "the gap, or unite them, in the file"
     ]
 
 
