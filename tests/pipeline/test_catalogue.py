@@ -17,7 +17,7 @@ from reports.diff import CLOSING, diff_folders
 from reports.tolerance import load_tolerance
 from tests.studies.catalogue import GOLDEN, Outcome, coverage, golden, run_all, times
 
-SAMPLE = ("bend", "kissing-vessels", "missing-wire", "introducer", "moved-phantom")
+SAMPLE = ("bend", "missing-wire", "moved-phantom")
 """Of the others bifurcation, bone-wall and anisotropic are in ``tests.numbers.imaging``, two-wires in test_seeing."""
 EXTENTS = [pytest.param(SAMPLE, id="sample"), pytest.param(catalogue.names(), id="all", marks=pytest.mark.slow)]
 

@@ -415,7 +415,7 @@ def test_the_package_runs_and_completes(tmp_path: Path) -> None:
         assert found.stdout.strip() == "study", words
 
 
-@pytest.mark.parametrize("closed", ["stdout", "stderr"])
+@pytest.mark.parametrize("closed", ["stdout", pytest.param("stderr", marks=pytest.mark.slow)])
 def test_a_reader_that_has_gone_does_not_change_the_exit_code(study: Path, tmp_path: Path, closed: str) -> None:
     """A gate in a pipe, ``wireval run | head -1``, said that all was well; and the verb has to finish."""
     read, write = os.pipe()

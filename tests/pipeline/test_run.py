@@ -622,8 +622,6 @@ def test_results_do_not_depend_on_workers_or_shards(short: Path, tmp_path: Path)
     assert len(pd.read_csv(tmp_path / "pool" / "timings.csv")) == 2
     table = tables.read(tmp_path / "pool" / "cases" / "second" / "errors.csv", ERRORS)
     pd.testing.assert_frame_equal(table, errors_of(tmp_path / "1"))
-    assert main(["report", str(tmp_path / "shards"), "-j", "2"]) == 0
-    assert (tmp_path / "shards" / "cases" / "second" / "report.html").exists()
 
 
 def test_a_damaged_frame_costs_that_frame_alone(study: Path, tmp_path: Path) -> None:

@@ -38,7 +38,8 @@ def folder(tmp_path_factory) -> Path:
     return folder
 
 
-@pytest.mark.parametrize("reference", [True, pytest.param(False, marks=pytest.mark.slow)])
+@pytest.mark.slow  # what is not loaded costs time alone
+@pytest.mark.parametrize("reference", [True, False])
 def test_a_tiny_wire_loads_what_frames_need(folder, reference):
     manifest = folder / "study" / "manifest.toml"
     if not reference:

@@ -71,6 +71,7 @@ def test_nothing_is_imported_from_the_working_folder(tmp_path: Path, name: str) 
     """Where `wireval` is started, a user's own package pipeline may lie: every case was lost to a dead worker."""
     (tmp_path / f"{name}.py").write_text("raise SystemExit('not mine')", encoding="utf-8")
     words = "import os, sys; os.chdir(sys.argv[1]); from pipeline.run.workers import in_processes; "
+    words += "from pipeline.run import workers; workers.PRELOADED = 'time'; "
     words += "print([o.result for o in in_processes([7], abs, 1)])"
     done = subprocess.run(
         [sys.executable, "-P", "-c", words, str(tmp_path)], env=with_root(), capture_output=True, text=True, check=False
@@ -82,7 +83,8 @@ def test_a_folder_for_temporary_files_may_have_a_long_path(tmp_path: Path) -> No
     """A socket's path has 107 bytes at most: `-j 2` ended in a traceback."""
     place = tmp_path / ("a" * 60) / ("b" * 60)
     place.mkdir(parents=True)
-    words = "from pipeline.run.workers import in_processes; print([o.result for o in in_processes([7], abs, 1)])"
+    words = "from pipeline.run import workers; workers.PRELOADED = 'time'; "
+    words += "print([o.result for o in workers.in_processes([7], abs, 1)])"
     env = with_root() | {"TMPDIR": str(place)}
     done = subprocess.run([sys.executable, "-c", words], env=env, capture_output=True, text=True, check=False)
     assert (done.stdout, done.stderr) == ("[7]\n", "")
