@@ -14,7 +14,7 @@ EXAMPLES = {
         'frames = "fifo"', 'frames = "/dev/zero"', 'frames = "/proc/self/mem"', 'frames = "loop"',
         'reference = "frames"', 'lumen = "fifo"', 'lumen = "frames"', 'traces = "/dev/zero"', 'truth = "fifo"',
     ),
-    "curve": ("truth 6", "truth 7", "a.csv 7", "a.vtp 8", "a.mrk.json 15"),  # NaN; 1e9; 1e9; 4 GiB packed; 1e9 mm
+    "curve": ("truth 6", "truth 7", "a.csv 7", "a.mrk.json 15"),  # NaN; 1e9; 1e9; 1e9 mm
     # a needle 1e6 mm long; coordinates of 1e9; 5,000 shells; 4 GiB packed; entities
     "surface": ("a.stl 4", "a.stl 5", "a.stl 9", "a.vtp 3", "a.vtp 5"),
     "setting": (

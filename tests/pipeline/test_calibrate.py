@@ -90,7 +90,7 @@ def test_parameters_are_found_again_and_the_clamp_with_them():
     assert all(frame.after_mm < frame.before_mm for frame in fit.frames)
 
 
-@pytest.mark.parametrize(("stated_deg", "apart"), [(0.0, False), (-12.0, True)])
+@pytest.mark.parametrize(("stated_deg", "apart"), [pytest.param(0.0, False, marks=pytest.mark.slow), (-12.0, True)])
 def test_rolls_that_are_stated_wrongly_have_no_common_offset(stated_deg, apart):
     """Of two insertions, one stated 11 degrees off, the mean was taken: 5 degrees wrong for both, +- 0.7, seen."""
     first, second = (

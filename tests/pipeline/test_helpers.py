@@ -237,6 +237,7 @@ def test_a_case_on_two_cores_is_the_case_on_one_file_by_file_and_so_is_what_the_
     assert result["counters"]["trace"][ASKED] > 0
 
 
+@pytest.mark.slow  # a promise of time alone
 def test_files_are_hashed_by_another_process_while_the_lumen_is_segmented(
     study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -130,6 +130,7 @@ def test_a_sweep_tells_no_rest_before_one_case_has_all_its_points(tmp_path: Path
     assert ["left" in line for line in stream.getvalue().splitlines()] == [False, True, True, False]
 
 
+@pytest.mark.slow  # the bar of a run is looked at every time
 def test_nor_does_the_bar_of_a_sweep(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("TERM", "xterm")
     stream, batch = Terminal(), swept(tmp_path)

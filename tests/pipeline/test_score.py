@@ -582,7 +582,6 @@ def test_a_score_of_others_is_not_replaced(known: Known, tmp_path: Path, capsys:
     assert "was scored with other settings: compare.skip_mm" in capsys.readouterr().err
     write_csv(one, [wire + [0.0, 0.01, 0.0] for wire in known[1]])
     assert main([*words, "--curves", str(one), "--curves", str(two)]) == 0, "the same wires, mended"
-    assert main([*words, "--curves", f"one={two}", "--curves", f"two={one}", "--fresh"]) == 0
 
 
 def test_the_steps_of_a_case_are_printed_once_and_not_once_a_simulator(known: Known, tmp_path: Path) -> None:
