@@ -230,6 +230,7 @@ def test_a_sweep_of_other_settings_is_not_shown_beside_a_new_result(
     assert not (out / "summary.pdf").exists()
 
 
+@pytest.mark.slow  # a promise of time alone
 def test_a_sweep_reads_the_lumen_of_a_case_once(short: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """And prepares its wall once: its points follow each other. The two cases here have one scan, and so one lumen."""
     both, out, read = two_cases(short, tmp_path / "study"), tmp_path / "out", []
