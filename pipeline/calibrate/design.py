@@ -11,7 +11,7 @@ import numpy as np
 from pipeline.calibrate.fit import Problem
 from pipeline.calibrate.residuals import Evidence
 from pipeline.calibrate.search import FIRST_FRICTION
-from pipeline.calibrate.trials import OWN, Point, Trial, lengths_of, quick, replayed
+from pipeline.calibrate.trials import OWN, Point, Trial, lengths_of, replayed
 from pipeline.calibrate.unknowns import FRICTION, Unknown
 from pipeline.model import Curve
 from pipeline.simulate.clamp import TracedFrame
@@ -47,7 +47,7 @@ def predicted(free: Sequence[Unknown], planned: Sequence[Trial], solver: SolverC
     """Standard deviations of all parameters; ValueError where a planned depth is not reached."""
     shared = {u.name: max(u.prior, FIRST_FRICTION) if u.name == FRICTION else u.prior for u in free}
     points = [Point(shared, np.zeros(OWN + len(trial.seen))) for trial in planned]
-    solver = quick(solver, lengths_of(planned[0].wire, solver)[0])
+    solver = solver.quick(lengths_of(planned[0].wire, solver)[0])
     found = []
     for trial, wires in zip(planned, replayed(list(zip(planned, points, strict=True)), solver), strict=True):
         seen, voxel = [], trial.voxel_mm

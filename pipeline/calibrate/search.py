@@ -7,7 +7,7 @@ import numpy as np
 
 from pipeline.calibrate.fit import Linear, Problem
 from pipeline.calibrate.residuals import Evidence
-from pipeline.calibrate.trials import OWN, lengths_of, quick
+from pipeline.calibrate.trials import OWN, lengths_of
 from pipeline.calibrate.unknowns import BENDING, FRICTION, ROLL, Unknown
 from pipeline.model import Array
 from pipeline.simulate.config import SolverConfig
@@ -81,7 +81,7 @@ class OwnRoll:
 
 def own_roll(one: Evidence, friction: float, solver: SolverConfig) -> OwnRoll:
     """The roll at which a wire lies as it was traced; all else but the clamp is as stated."""
-    longest = quick(solver, lengths_of(one.trial.wire, solver)[0])
+    longest = solver.quick(lengths_of(one.trial.wire, solver)[0])
     problem = Problem((), {FRICTION: friction}, (one,), longest)
     still = Problem((), {FRICTION: 0.0}, (one,), longest)
     means, _ = problem.prior

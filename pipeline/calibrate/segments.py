@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pipeline.calibrate.search import Fit
-from pipeline.calibrate.trials import lengths_of, quick, replayed
+from pipeline.calibrate.trials import lengths_of, replayed
 from pipeline.model import Wire
 from pipeline.simulate.config import SolverConfig
 from pipeline.simulate.resolution import AGREED_MM, moved_mm
@@ -35,7 +35,7 @@ def resolved(fit_with: Callable[[SolverConfig], Fit], wire: Wire, solver: Solver
     """The fit to insertions of a wire with segments as short as it needs. fit_with : called with the settings."""
     lengths, at = lengths_of(wire, solver), 0
     while True:
-        fit = fit_with(quick(solver, lengths[at]))
+        fit = fit_with(solver.quick(lengths[at]))
         if len(lengths) == 1:
             return fit, Segments(lengths[0], "as stated")
         found, segments = _needed(fit, lengths, at, solver)
@@ -52,7 +52,7 @@ def _needed(fit: Fit, lengths: Sequence[float], at: int, solver: SolverConfig) -
     """
     moved = ""
     for n in range(min(at, len(lengths) - 2), len(lengths) - 1):
-        long, short = (_wires(fit, s) for s in (quick(solver, lengths[n]), replace(solver, segment_mm=lengths[n + 1])))
+        long, short = (_wires(fit, s) for s in (solver.quick(lengths[n]), replace(solver, segment_mm=lengths[n + 1])))
         moved = _moved(fit, long, short)
         if not moved:
             reason = f"halving them moved no fitted wire by more than {AGREED_MM} mm, near snaps apart, and no "

@@ -92,11 +92,6 @@ def lengths_of(wire: Wire, solver: SolverConfig) -> list[float]:
     return lengths_mm("auto", wire.rest_curvature_per_mm) if solver.segment_mm == "auto" else [solver.segment_mm]
 
 
-def quick(solver: SolverConfig, segment_mm: float) -> SolverConfig:
-    """The settings of a fit with segments of one length: no step is repeated."""
-    return replace(solver, segment_mm=segment_mm, finest_mm=solver.step_mm)
-
-
 def way_at(trial: Trial, point: Point) -> Way:
     """The way of the hand with other parameters, on which the frames with a trace are read."""
     turn = float(point.own[6]) + (0.0 if trial.roll_free else point.shared.get(ROLL, 0.0))

@@ -22,6 +22,11 @@ R = TypeVar("R")
 Outcomes = Generator[Outcome[J, R], None, None]
 
 
+def elsewhere(count: int, workers: int = 1, address: str = "", limits: Limits = NO_LIMITS) -> bool:
+    """Whether so many jobs run in other processes than this one: on a cluster, within limits, or side by side."""
+    return bool(address) or limits.any or (workers > 1 and count > 1)
+
+
 def run_all(
     jobs: Sequence[J], work: Callable[[J], R], workers: int = 1, address: str = "", limits: Limits = NO_LIMITS
 ) -> Outcomes[J, R]:
@@ -37,7 +42,7 @@ def run_all(
                 return _on_cluster(client, part, work)
 
             yield from _again(jobs, there, lambda part: _again(part, there, there))
-    elif limits.any or (workers > 1 and len(jobs) > 1):
+    elif elsewhere(len(jobs), workers, limits=limits):
 
         def here(part: Sequence[J]) -> Outcomes[J, R]:
             return in_processes(part, work, workers, limits)

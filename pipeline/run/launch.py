@@ -12,7 +12,7 @@ from typing import Any
 
 from pipeline.run import ledger
 from pipeline.run.aggregate import Totals, aggregate
-from pipeline.run.batch import run_all
+from pipeline.run.batch import elsewhere, run_all
 from pipeline.run.cache import Store, forget_lumen
 from pipeline.run.case import Job, clear, each_on, finished, run_case
 from pipeline.run.earlier import remove_arrays, remove_others, remove_records
@@ -106,9 +106,8 @@ class Plan:
 
     @property
     def elsewhere(self) -> bool:
-        """Whether cases run in other processes than this one; see ``run_all``."""
-        count = len(self.cases) * (1 + len(self.points))
-        return bool(self.address) or self.limits.any or (self.workers > 1 and count > 1)
+        """Whether cases run in other processes than this one."""
+        return elsewhere(len(self.jobs) + len(self.sweep_jobs), self.workers, self.address, self.limits)
 
 
 def without(plan: Plan, faults: Mapping[str, Sequence[str]]) -> Plan:

@@ -1,6 +1,6 @@
 """Settings of the energy minimisation and of what is simulated."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field
@@ -43,6 +43,10 @@ class SolverConfig:
     """Steps in which the wire gives way are taken again, down to this length. With step_mm or more they never are."""
     initial: Literal["slide", "translate"] = "slide"
     """slide or translate: how the wire is moved before it relaxes."""
+
+    def quick(self, segment_mm: float) -> "SolverConfig":
+        """These settings with segments of one length and no repeated steps, for wires that are only compared."""
+        return replace(self, segment_mm=segment_mm, finest_mm=self.step_mm)
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from pipeline.calibrate.estimates import Estimate, _judged, calibrated
 from pipeline.calibrate.fit import Problem
 from pipeline.calibrate.residuals import Evidence, weights_of
 from pipeline.calibrate.search import Fit, own_roll
-from pipeline.calibrate.trials import OWN, Point, Trial, quick, replayed
+from pipeline.calibrate.trials import OWN, Point, Trial, replayed
 from pipeline.calibrate.unknowns import BENDING, FRICTION, REST, ROLL, TAPER, bent, lacking, spread_in_words, unknowns
 from pipeline.cli import main
 from pipeline.compare.pooled import is_pooled
@@ -193,7 +193,7 @@ def test_wires_of_a_fit_have_the_stated_segments():
     one = trial()
     at = Point(TRUE, np.zeros(OWN + len(DEPTHS)))
     for mm in (0.5, 1.0):
-        (wires,) = replayed([(one, at)], quick(SolverConfig(), mm))
+        (wires,) = replayed([(one, at)], SolverConfig().quick(mm))
         steps = np.linalg.norm(np.diff(wires[0].joints_mm, axis=0), axis=1)
         assert np.median(steps) == pytest.approx(mm, rel=0.01)
 

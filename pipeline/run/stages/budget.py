@@ -153,7 +153,7 @@ class Work:
         self.scene = Scene(*shared, self.way, case.catheter, config.budget.seed)
         lengths = lengths_mm(config.solver.segment_mm, altered(case.wire, config.simulate).rest_curvature_per_mm)
         segment = lengths[0] if config.solver.segment_mm == "auto" else known.segment_mm
-        quick = replace(as_simulated, segment_mm=segment, finest_mm=config.solver.step_mm)
+        quick = config.solver.quick(segment)
         self._settle(replace(self.scene, solver=quick))
 
     def _settle(self, quick: Scene) -> None:

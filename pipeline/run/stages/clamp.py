@@ -80,7 +80,7 @@ def _replayed(
     case, config, lumen = run.case, run.config, known.lumen
     assert lumen is not None
     longest = lengths_mm(config.solver.segment_mm, altered(case.wire, config.simulate).rest_curvature_per_mm)[0]
-    settings = replace(config.solver, segment_mm=min(longest, most_mm), finest_mm=config.solver.step_mm)
+    settings = config.solver.quick(min(longest, most_mm))
     insertions = [
         insertion_of(case.wire, case.wall, lumen, clamp, settings, config.simulate, case.catheter) for clamp in clamps
     ]

@@ -98,7 +98,7 @@ def variant_wires(run: Context, known: Known, way: SimulatedVariant) -> Wires:
     case, lumen, clamp, frames = run.case, known.lumen, known.clamp, simulated_frames(known)
     assert lumen is not None
     assert clamp is not None
-    settings = replace(run.config.solver, segment_mm=known.segment_mm, finest_mm=run.config.solver.step_mm)
+    settings = run.config.solver.quick(known.segment_mm)
     catheter = case.catheter if way.catheter else None
     try:
         insertion = insertion_of(case.wire, case.wall, lumen, clamp, settings, way.config, catheter)
