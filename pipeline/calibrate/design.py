@@ -5,13 +5,15 @@ The solver's own wires at the stated parameters stand for the traces; only deriv
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from pipeline.calibrate.fit import Problem
 from pipeline.calibrate.residuals import Evidence
-from pipeline.calibrate.search import FIRST_FRICTION
-from pipeline.calibrate.trials import OWN, Point, Trial, lengths_of, replayed
+from pipeline.calibrate.search import FIRST_FRICTION, Fit
+from pipeline.calibrate.segments import resolved
+from pipeline.calibrate.trials import OWN, Point, Trial, replayed
 from pipeline.calibrate.unknowns import FRICTION, Unknown
 from pipeline.model import Curve
 from pipeline.simulate.clamp import TracedFrame
@@ -45,9 +47,14 @@ def straight_to(trial: Trial, depths_mm: Sequence[float], rolls_deg: Sequence[fl
 
 def predicted(free: Sequence[Unknown], planned: Sequence[Trial], solver: SolverConfig) -> list[Predicted]:
     """Standard deviations of all parameters; ValueError where a planned depth is not reached."""
+    fit, _ = resolved(partial(_as_stated, free, planned), planned[0].wire, solver)
+    return [Predicted(u, fit.sd[u.name]) for u in free]
+
+
+def _as_stated(free: Sequence[Unknown], planned: Sequence[Trial], solver: SolverConfig) -> Fit:
+    """The planned study linearised at the stated parameters, of which there is nothing to fit."""
     shared = {u.name: max(u.prior, FIRST_FRICTION) if u.name == FRICTION else u.prior for u in free}
     points = [Point(shared, np.zeros(OWN + len(trial.seen))) for trial in planned]
-    solver = solver.quick(lengths_of(planned[0].wire, solver)[0])
     found = []
     for trial, wires in zip(planned, replayed(list(zip(planned, points, strict=True)), solver), strict=True):
         seen, voxel = [], trial.voxel_mm
@@ -61,5 +68,4 @@ def predicted(free: Sequence[Unknown], planned: Sequence[Trial], solver: SolverC
         found.append(Evidence(replace(trial, seen=tuple(seen), force_N=force)))
     problem = Problem(tuple(free), {}, tuple(found), solver)
     x = np.concatenate([[shared[u.name] for u in free], np.zeros(len(problem.prior[0]) - len(free))])
-    deviations = np.sqrt(np.diag(problem.linear(x).covariance))
-    return [Predicted(u, float(v)) for u, v in zip(free, deviations, strict=False)]
+    return Fit(problem, problem.linear(x), ())

@@ -7,7 +7,7 @@ import numpy as np
 
 from pipeline.calibrate.fit import Linear, Problem
 from pipeline.calibrate.residuals import Evidence
-from pipeline.calibrate.trials import OWN, lengths_of
+from pipeline.calibrate.trials import OWN
 from pipeline.calibrate.unknowns import BENDING, FRICTION, ROLL, Unknown
 from pipeline.model import Array
 from pipeline.simulate.config import SolverConfig
@@ -70,6 +70,22 @@ def held_at_prior(fit: Fit, names: Sequence[str]) -> Fit:
     return Fit(problem, problem.solved(x), fit.starts)
 
 
+def roll_fitted(one: Evidence, friction: float, solver: SolverConfig) -> Fit:
+    """The roll at which one wire lies as it was traced; all else but the clamp is as stated."""
+    problem = Problem((), {FRICTION: friction}, (one,), solver)
+    still = replace(problem, held={FRICTION: 0.0})
+    means, _ = problem.prior
+    xs = [np.where(np.arange(len(means)) == OWN - 1, roll, means) for roll in ROLLS_DEG]
+    even = [np.ones(len(one.trial.seen))]
+    found = np.array([float(own[0] @ own[0]) for own in still.residuals(xs, even, 1.0)])
+    solved = [problem.solved(xs[k]) for k in _valleys(found)]
+    scale = min(one.scale for one in solved)
+    ends = problem.residuals([one.x for one in solved], even, scale)
+    values = [problem.value(one.x, r) for one, r in zip(solved, ends, strict=True)]
+    starts = [(float(one.x[OWN - 1]), float(value)) for one, value in zip(solved, values, strict=True)]
+    return Fit(problem, solved[int(np.argmin(values))], tuple(starts))
+
+
 @dataclass(frozen=True)
 class OwnRoll:
     """The roll of one insertion, degrees, its standard deviation, and other rolls that fit as well."""
@@ -79,25 +95,13 @@ class OwnRoll:
     rivals_deg: tuple[float, ...]
 
 
-def own_roll(one: Evidence, friction: float, solver: SolverConfig) -> OwnRoll:
-    """The roll at which a wire lies as it was traced; all else but the clamp is as stated."""
-    longest = solver.quick(lengths_of(one.trial.wire, solver)[0])
-    problem = Problem((), {FRICTION: friction}, (one,), longest)
-    still = Problem((), {FRICTION: 0.0}, (one,), longest)
-    means, _ = problem.prior
-    xs = [np.where(np.arange(len(means)) == OWN - 1, roll, means) for roll in ROLLS_DEG]
-    even = [np.ones(len(one.trial.seen))]
-    found = np.array([float(own[0] @ own[0]) for own in still.residuals(xs, even, 1.0)])
-    solved = [problem.solved(xs[k]) for k in _valleys(found)]
-    scale = min(one.scale for one in solved)
-    ends = problem.residuals([one.x for one in solved], even, scale)
-    values = np.array([problem.value(one.x, r) for one, r in zip(solved, ends, strict=True)])
-    best = int(np.argmin(values))
-    sd = float(np.sqrt(solved[best].covariance[OWN - 1, OWN - 1]))
-    rolls = [float(one.x[OWN - 1]) for one in solved]
-    as_good = [r for r, v in zip(rolls, values, strict=True) if v - values[best] < AS_GOOD]
-    rivals = [r for r in as_good if abs((r - rolls[best] + 180.0) % 360.0 - 180.0) > max(3.0 * sd, 1.0)]
-    return OwnRoll(rolls[best], sd, tuple(rivals))
+def own_roll(fit: Fit) -> OwnRoll:
+    """What ``roll_fitted`` found."""
+    roll, least = min(fit.starts, key=lambda start: start[1])
+    sd = float(np.sqrt(fit.linear.covariance[OWN - 1, OWN - 1]))
+    as_good = [other for other, value in fit.starts if value - least < AS_GOOD]
+    rivals = [other for other in as_good if abs((other - roll + 180.0) % 360.0 - 180.0) > max(3.0 * sd, 1.0)]
+    return OwnRoll(roll, sd, tuple(rivals))
 
 
 def _valleys(values: Array) -> list[int]:

@@ -11,7 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from pipeline.calibrate.search import Fit
-from pipeline.calibrate.trials import lengths_of, replayed
+from pipeline.calibrate.trials import OWN, lengths_of, replayed
+from pipeline.calibrate.unknowns import ROLL
 from pipeline.model import Wire
 from pipeline.simulate.config import SolverConfig
 from pipeline.simulate.resolution import AGREED_MM, moved_mm
@@ -85,8 +86,7 @@ def _moved(fit: Fit, coarse: Wires, fine: Wires) -> str:
     points = problem.points(about.x)
     left = [problem.left(wires, points, about.weights, about.scale) for wires in (coarse, fine)]
     change = sum(j.T @ (new - old) for j, old, new in zip(about.jacobian, *left, strict=True))
-    shift = (about.covariance @ change)[: len(problem.free)] / [*fit.sd.values()]
-    most = int(np.argmax(np.abs(shift)))
-    if abs(shift[most]) <= MOST_SD:
-        return ""
-    return f"{problem.free[most].name} by {abs(shift[most]):.1f} of its standard deviations"
+    sds = np.abs(about.covariance @ change) / np.sqrt(np.diag(about.covariance))
+    asked = {u.name: float(sd) for u, sd in zip(problem.free, sds, strict=False)} or {ROLL: float(sds[OWN - 1])}
+    most = max(asked, key=asked.__getitem__)
+    return f"{most} by {asked[most]:.1f} of its standard deviations" if asked[most] > MOST_SD else ""

@@ -7,6 +7,7 @@ import os
 import re
 from collections import Counter
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -19,7 +20,7 @@ from pipeline.calibrate.design import predicted, straight_to
 from pipeline.calibrate.estimates import Estimate, _judged, calibrated
 from pipeline.calibrate.fit import Problem
 from pipeline.calibrate.residuals import Evidence, weights_of
-from pipeline.calibrate.search import Fit, own_roll
+from pipeline.calibrate.search import Fit, own_roll, roll_fitted
 from pipeline.calibrate.trials import OWN, Point, Trial, replayed
 from pipeline.calibrate.unknowns import BENDING, FRICTION, REST, ROLL, TAPER, bent, lacking, spread_in_words, unknowns
 from pipeline.cli import main
@@ -189,6 +190,34 @@ def test_segments_may_not_move_a_parameter_by_more_than_is_known_of_it(at_truth,
     assert bool(segments._moved(at_truth, coarse, fine)) == bool(moved)
 
 
+def test_segments_of_a_fitted_roll_may_not_turn_it_by_more_than_is_known_of_it(monkeypatch):
+    """``roll_deg = "fit"`` took the longest ones unasked."""
+    one = replace(trial(values=TRUE | {ROLL: 0.0}, depths=(14.0,)), wire=bent(WIRE, TRUE), roll_free=True)
+    fit, found = segments.resolved(partial(roll_fitted, Evidence(one), 0.04), WIRE, SolverConfig())
+    assert (fit.problem.solver.segment_mm, found.doubt) == (found.mm, "")
+    monkeypatch.setattr(segments, "AGREED_MM", np.inf)
+    wires, sd = segments._wires(fit, SETTINGS), own_roll(fit).sd_deg
+    turned = fit.linear.x + 3.0 * sd * (np.arange(len(fit.linear.x)) == OWN - 1)
+    aside = segments._wires(replace(fit, linear=replace(fit.linear, x=turned)), SETTINGS)
+    assert segments._moved(fit, wires, wires) == ""
+    assert segments._moved(fit, wires, aside).startswith("roll_offset_deg by 3.")
+
+
+@pytest.mark.parametrize("moves_mm", [0.01, 1.0])
+def test_a_planned_study_is_linearised_with_segments_as_short_as_its_wires_need(monkeypatch, moves_mm):
+    """``--design`` took the longest ones unasked."""
+    planned, used, plain = straight_to(trial(), (10.0, 16.0), [0.0] * 2), [], segments._wires
+
+    def of_length(fit, solver):
+        used.append(solver.segment_mm)
+        return [[replace(w, joints_mm=w.joints_mm + moves_mm * solver.segment_mm) for w in plain(fit, solver)[0]]]
+
+    monkeypatch.setattr(segments, "_wires", of_length)
+    monkeypatch.setattr(segments, "MOST_SD", np.inf)
+    predicted(all_of(planned)[:2], [planned], SolverConfig())
+    assert min(used) == (0.5 if moves_mm == 0.01 else 0.0625)
+
+
 def test_wires_of_a_fit_have_the_stated_segments():
     one = trial()
     at = Point(TRUE, np.zeros(OWN + len(DEPTHS)))
@@ -322,7 +351,8 @@ def test_the_roll_of_one_frame_is_found_from_anywhere():
     for true in (-150.0, 10.0, 120.0):
         one = trial(values=TRUE | {ROLL: 0.0}, depths=(14.0,))
         turned = tuple(replace(frame, roll_deg=30.0 - true) for frame in one.seen)
-        found = own_roll(Evidence(replace(one, seen=turned, wire=bent(WIRE, TRUE), roll_free=True)), 0.04, SETTINGS)
+        free = Evidence(replace(one, seen=turned, wire=bent(WIRE, TRUE), roll_free=True))
+        found = own_roll(roll_fitted(free, 0.04, SETTINGS))
         assert found.roll_deg == pytest.approx(true, abs=3.0)
         assert found.sd_deg < 5.0
 

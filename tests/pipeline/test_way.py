@@ -144,11 +144,12 @@ def test_a_calibrated_roll_turns_frames_that_are_gone_through_too(run: Context) 
 def test_the_roll_is_fitted_behind_the_frames_before_it(run: Context, monkeypatch: pytest.MonkeyPatch) -> None:
     asked = []
 
-    def own_roll(one: Evidence, *_: Any) -> Any:
+    def roll_fitted(one: Evidence, *_: Any) -> Any:
         asked.append(way_at(one.trial, Point({}, np.zeros(OWN + 1))))
-        return SimpleNamespace(roll_deg=30.0, sd_deg=1.0, rivals_deg=())
 
-    monkeypatch.setattr(roll, "own_roll", own_roll)
+    monkeypatch.setattr(roll, "roll_fitted", roll_fitted)
+    monkeypatch.setattr(roll, "resolved", lambda fit_with, *_: (fit_with(None), SimpleNamespace(doubt="")))
+    monkeypatch.setattr(roll, "own_roll", lambda _: SimpleNamespace(roll_deg=30.0, sd_deg=1.0, rivals_deg=()))
     fit = replace(run, case=run.case.model_copy(update={"roll_deg": "fit"}))
     frames = tuple(replace(frame, roll_deg=0.0) for frame in known(run, [0]).frames)
     roll.with_fitted_roll(fit, replace(known(run), frames=frames))

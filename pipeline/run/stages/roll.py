@@ -1,9 +1,11 @@
 """``roll_deg = "fit"``: the roll from the first frame that shows the wire, which is not scored afterwards."""
 
 from dataclasses import replace
+from functools import partial
 
 from pipeline.calibrate.residuals import Evidence
-from pipeline.calibrate.search import own_roll
+from pipeline.calibrate.search import own_roll, roll_fitted
+from pipeline.calibrate.segments import resolved
 from pipeline.run.stages.given import trial_of
 from pipeline.run.stages.known import Context, Known
 from pipeline.status import FrameStatus, StageError
@@ -24,7 +26,9 @@ def with_fitted_roll(run: Context, known: Known) -> Known:
     # a sensitivity run turns the wire away from what is fitted: its offset is no part of the fit
     frames = [replace(frame, roll_deg=frame.roll_deg - first.roll_deg) for frame in known.frames]
     trial = trial_of(run, known, frames, roll_free=True, only={first.index})
-    found = own_roll(Evidence(trial), case.wall.friction, run.config.solver)
+    fit, segments = resolved(partial(roll_fitted, Evidence(trial), case.wall.friction), trial.wire, run.config.solver)
+    found = own_roll(fit)
+    log.warnings += [f'roll_deg = "fit": {segments.doubt}'] * bool(segments.doubt)
     log.assumptions.append(
         f"the roll was fitted on frame {first.index}, which is not scored: {found.roll_deg:.1f} degrees "
         f"(standard deviation {found.sd_deg:.1f})"
