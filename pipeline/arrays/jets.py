@@ -50,8 +50,13 @@ def _weights(x: float, h: float, sigma: float, n: int, w: NDArray[Any]) -> tuple
         w[2, i - first] = g * (d * d - 1.0) / (s * s)
     if total > 0.0:
         for m in range(3):
+            excess = 0.0
             for i in range(stop - first):
                 w[m, i] /= total
+                excess += w[m, i]
+            # the derivatives of a constant are 0 wherever x lies between the nodes: grey may have any zero
+            for i in range(stop - first if m > 0 else 0):
+                w[m, i] -= excess * w[0, i]
     return first, stop
 
 

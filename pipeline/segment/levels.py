@@ -4,7 +4,7 @@ A method is a function like :func:`fuzzy.fuzzy_region`.
 """
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,10 +18,13 @@ from pipeline.segment.noise import noise_left, smoothed, voxel_noise
 from pipeline.status import FrameStatus, StageError
 from solver.grid import Grid
 
-BOX_MM = 6.0
-"""Half width of the box around a seed in which the levels are estimated: a carotid artery and what is around it."""
+BOXES_MM = 6.0, 10.0, 17.0, 30.0
+"""Half widths of the box around a seed in which the levels are estimated, the next where the vessel fills one: of a
+carotid artery and what is around it, up to an aorta, of which the first holds nothing but its own noise."""
 LEAST_BOX = 8
 """Its least half width in voxels."""
+LEAST_DARK = 0.05
+"""Least share of the box that lies off the vessel, two voxels from anything as bright."""
 THICK = 5.0
 """Depth over blur from which the grey in the middle of a vessel reaches its plateau."""
 BRIGHTER = 1.25
@@ -86,14 +89,24 @@ def _median(values: NDArray[Any], otherwise: float) -> float:
     return float(np.median(values)) if values.size >= 8 else otherwise
 
 
-def _two_levels(grey: NDArray[Any], seed: float, at: tuple[int, ...]) -> tuple[float, float, NDArray[np.bool_]]:
-    """Median grey of the bright region that holds the seed, that of what is darker, and the region, by fixed point.
+class _Levels(NamedTuple):
+    """Median grey of the bright region that holds the seed, that of what is darker, the region, and the share that is
+    darker."""
+
+    inside: float
+    outside: float
+    region: NDArray[np.bool_]
+    dark: float
+
+
+def _two_levels(grey: NDArray[Any], seed: float, at: tuple[int, ...]) -> _Levels:
+    """The two levels in a box, by fixed point.
 
     The region's median is held near the seed's grey, lest bone that touches it be taken for the vessel.
     """
     outside = float(np.percentile(grey, 10))
     inside = seed
-    region = np.zeros(grey.shape, bool)
+    region = apart = np.zeros(grey.shape, bool)
     for _ in range(6):
         bright = grey > 0.5 * (inside + outside)
         if not bright[at]:
@@ -103,13 +116,24 @@ def _two_levels(grey: NDArray[Any], seed: float, at: tuple[int, ...]) -> tuple[f
         whole = _median(grey[region], inside)
         inside = _median(grey[ndimage.binary_erosion(region)], whole)
         inside = min(inside, seed + 0.5 * (seed - outside))
-        outside = _median(grey[~ndimage.binary_dilation(bright, iterations=2)], outside)
-    return inside, outside, region
+        apart = ~ndimage.binary_dilation(bright, iterations=2)
+        outside = _median(grey[apart], outside)
+    return _Levels(inside, outside, region, float(np.mean(apart)))
 
 
 def levels_at(grid: Grid, index: NDArray[Any]) -> tuple[GreyLevels, NDArray[np.int64]]:
     """GreyLevels around one seed voxel, and the voxel (3,) to start at: that of median smoothed grey among its 3^3."""
-    box = box_around(grid, index, BOX_MM, LEAST_BOX)
+    for half in BOXES_MM:
+        levels, found, dark = _levels_in(grid, box_around(grid, index, half, LEAST_BOX), index)
+        if dark >= LEAST_DARK:
+            break
+    return levels, found
+
+
+def _levels_in(
+    grid: Grid, box: tuple[slice, slice, slice], index: NDArray[Any]
+) -> tuple[GreyLevels, NDArray[np.int64], float]:
+    """What ``levels_at`` returns, of a box around the seed, and the share of the box that lies off the vessel."""
     raw = np.asarray(grid.values[box], np.float32)
     grey = smoothed(raw)
     start = np.array([s.start for s in box])
@@ -120,11 +144,11 @@ def levels_at(grid: Grid, index: NDArray[Any]) -> tuple[GreyLevels, NDArray[np.i
     seed = float(np.median(around))
     best = np.unravel_index(int(np.argmin(np.abs(around - seed))), around.shape)
     at = tuple(int(b) + s.start for b, s in zip(best, inner, strict=True))
-    inside, outside, region = _two_levels(grey, seed, at)
+    inside, outside, region, dark = _two_levels(grey, seed, at)
     found = start + np.array(at)
     noise = voxel_noise(raw - grey, region)
     left = noise_left(raw, region, grey > 0.5 * (inside + outside), noise)
-    return GreyLevels(inside, outside, noise, left, tuple(found.tolist()), inside), found
+    return GreyLevels(inside, outside, noise, left, tuple(found.tolist()), inside), found, dark
 
 
 def scanner_blur(blur_mm: float, taps: NDArray[Any], voxel: float) -> float:

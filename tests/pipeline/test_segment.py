@@ -53,6 +53,21 @@ def test_wall_of_a_blurred_tube_is_where_it_was_drawn(radius, noise, bar):
     assert np.sqrt(np.mean(error**2)) < bar
 
 
+@pytest.mark.parametrize("radius", [9.5, 12.5])
+def test_the_wall_of_an_aorta_is_where_it_was_drawn(radius):
+    """It fills the box in which levels are estimated: two voxels inside, the wall was noise, and nothing said so."""
+    half, voxel = np.arange(-radius - 4.0, radius + 4.1, 0.6), 0.6
+    off = np.hypot(*np.meshgrid(half, half, indexing="ij")) - radius
+    clean = np.repeat(phantoms.BACKGROUND + 900.0 * phantoms.partial_volume(off, voxel)[:, :, None], 40, axis=2)
+    scan = Volume(np.asfortranarray(phantoms.scan(clean, 0.8, 40.0, seed=1)), [voxel] * 3, [half[0], half[0], 0.0])
+    lumen = segment(scan, [[0.6, -0.6, 12.0]])
+    assert lumen.warnings == ()
+    there = np.argwhere(np.abs(lumen.distance.values) < 0.6)
+    at = lumen.distance.to_mm(there[(there[:, 2] > 10) & (there[:, 2] < 30)])
+    error = lumen.distance.values[tuple(there[(there[:, 2] > 10) & (there[:, 2] < 30)].T)] + radius
+    assert np.abs(np.mean(error - np.hypot(at[:, 0], at[:, 1]))) < 0.1 * voxel
+
+
 @pytest.mark.parametrize("noise", [0.0, 90.0])
 def test_bone_that_touches_is_not_what_the_vessel_is_as_bright_as(noise):
     """It is deeper than the vessel: its grey was taken for the plateau, and the wall lay 0.2 voxels too far in."""

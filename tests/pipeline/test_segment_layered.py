@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.special import ndtr
 
+from pipeline.arrays.edges import layer_in
 from pipeline.model import Lumen, Volume
 from pipeline.segment import segment
 from pipeline.segment.shown import beside_the_wall
@@ -26,6 +28,16 @@ def phantom(greys, thick_mm, noise=25.0, seed=1):
     clean = beyond + (layer - beyond) * phantoms.partial_volume(distance - thick_mm, VOXEL)
     clean += (vessel - layer) * phantoms.partial_volume(distance, VOXEL)
     return Volume(phantoms.scan(clean, 0.7, noise, seed), [VOXEL] * 3, origin), curve, distance
+
+
+def test_a_vessel_along_the_voxels_has_no_layer():
+    """All its slices have the same few distances, which are not the middles of the bins: a layer of 1.2 voxels."""
+    half = np.arange(-24, 24.1)
+    off = np.hypot(*np.meshgrid(half, half, indexing="ij")) - 10.0 / 0.6
+    near = np.abs(off) < 8.0
+    grey = 100.0 + 900.0 * ndtr(-off[near] / 0.85)
+    distances, greys = np.repeat(off[near], 40), np.repeat(grey, 40)
+    assert layer_in(distances, greys + np.random.default_rng(0).normal(0.0, 40.0, len(greys))) is None
 
 
 @pytest.mark.parametrize(
