@@ -9,6 +9,8 @@ ENERGY_FLOOR_ANGLE = 1e-7
 REST_ANGLE = 1e-15
 """Root of the sum of the squared joint angles of an untouched wire, rad, that is rounding: 1e-12 mm at the tip of a
 metre of it."""
+MEETINGS = 10
+"""Halvings of the last half voxel of a wire that springs back to a wall, until it has no more energy than before."""
 MOMENT = 1e-5
 """Largest residual moment accepted at a joint, relative to the largest moment in the wire."""
 CURVATURE_FLOOR = 1e-6

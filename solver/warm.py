@@ -17,6 +17,7 @@ from solver._kernels.forks import turned_aside
 from solver._kernels.insertion import accept_or_revert, begin_step, collect, next_target
 from solver._kernels.minimise import look_again
 from solver._kernels.septum import through_wall
+from solver._kernels.spring_back import spring_back
 from solver._kernels.start import extrapolate_start, lay_along
 from solver.doors import instance
 from solver.grid import Grid
@@ -64,7 +65,7 @@ def warm_up(*, beside: bool = False) -> None:
 def compile_lanes() -> None:
     """Compile the kernels of insertions that go in lock-step."""
     with no_collection():
-        _compile(next_target, lay_along, begin_step, extrapolate_start, newton_method.rest_shape, look_again)
+        _compile(next_target, lay_along, begin_step, extrapolate_start, spring_back, look_again)
         wall = _wall()
         wires = [Insertion(WIRE, wall, [0.0, 0.0, 0.0], [0.0, 0.0, 1.0]) for _ in range(2)]
         Insertions(wires, threads=1).to_depths([1.0])

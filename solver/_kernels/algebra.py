@@ -3,9 +3,10 @@
 Symmetric matrices are six numbers (xx, yy, zz, xy, xz, yz), general ones nine, row by row.
 """
 
+import math
 from typing import Any
 
-from solver._kernels.flags import inlined
+from solver._kernels.flags import inlined, merged
 
 Pair = tuple[float, float]
 Three = tuple[float, float, float]
@@ -168,3 +169,13 @@ def store9(r: Any, n: int, a: Nine) -> None:
     r[n, 0, 0], r[n, 0, 1], r[n, 0, 2] = a[:3]
     r[n, 1, 0], r[n, 1, 1], r[n, 1, 2] = a[3:6]
     r[n, 2, 0], r[n, 2, 1], r[n, 2, 2] = a[6:]
+
+
+@merged
+def farthest(a: Any, at: int, b: Any, to: int, count: int) -> float:
+    """Largest distance of ``count`` joints of two wires, mm, from joint ``at`` of one and ``to`` of the other on."""
+    most = 0.0
+    for m in range(count):
+        way = minus(load3(a, at + m), load3(b, to + m))
+        most = max(most, dot(way, way))
+    return math.sqrt(most)

@@ -75,8 +75,8 @@ def way_below(field: Field, a: Three, b: Three, way: float, rise: float) -> floa
     while i <= steps:
         here = distance_at(field, a, i / steps, b)
         if here > limit:
+            before = distance_at(field, a, (i - 1) / steps, b)
             return (i - 1 + max(limit - before, 0.0) / (here - before)) / steps
-        before = here
         i += 1 + proven(field, here, way / steps)
     return 1.0
 

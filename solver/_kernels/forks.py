@@ -8,7 +8,7 @@ import math
 from typing import Any
 
 from solver import _tolerances as tol
-from solver._kernels.algebra import dot, load3, minus, scaled, store3
+from solver._kernels.algebra import dot, farthest, load3, minus, scaled, store3
 from solver._kernels.data import CONVERGED, CURRENT, SPARE, TRIAL, Problem
 from solver._kernels.energy import bending_energy, energy_of, total_energy
 from solver._kernels.flags import cached, inlined, kernel, merged
@@ -152,13 +152,3 @@ def softest_way(problem: Problem, k: int, report: Any) -> bool:
 def term_at(rung: int) -> float:
     """Size of a negative Levenberg term."""
     return tol.SOFTEST * 10.0 ** (0.25 * rung)  # type: ignore[no-any-return]
-
-
-@merged
-def farthest(a: Any, at: int, b: Any, to: int, count: int) -> float:
-    """Largest distance of ``count`` joints of two wires, mm, from joint ``at`` of one and ``to`` of the other on."""
-    most = 0.0
-    for m in range(count):
-        way = minus(load3(a, at + m), load3(b, to + m))
-        most = max(most, dot(way, way))
-    return math.sqrt(most)

@@ -14,6 +14,7 @@ from solver._kernels.flags import cached, inlined, kernel, merged
 from solver._kernels.forces import copy_state, forget_forces, least_turn_cosine
 from solver._kernels.friction import hold_on, take_loads
 from solver._kernels.newton import costate
+from solver._kernels.spring_back import rests
 
 METHODS = ("newton", "closed_form")
 NEWTON, CLOSED_FORM = range(2)
@@ -29,7 +30,7 @@ def minimise(problem: Problem, slot: int, k: int, limits: Limits, report: Any) -
     now = problem.scratch.descent[0]
     begin(now, slot, energy_of(problem, slot))
     report.start, report.pivot = now.energy, 1.0
-    if limits.method == NEWTON and newton_method.rests(problem, k, now):
+    if limits.method == NEWTON and rests(problem, k, now):
         forget_forces(report)
         return CONVERGED, 0, now.slot, now.energy
     for iteration in range(limits.max_iterations):
@@ -67,7 +68,7 @@ def relax_with_friction(
     rubs, counters = problem.friction.coefficient > 0.0, problem.scratch.counters[0]
     counters.relaxations_without_friction += not rubs
     counters.relaxations_without_twist += not problem.twisting
-    problem.scratch.descent[0].forked = 0
+    problem.scratch.descent[0].forked = problem.scratch.descent[0].sprung = 0
     if rubs:
         take_loads(problem, slot, k, 1.0)
         hold_on(problem, k)

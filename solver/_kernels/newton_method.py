@@ -12,14 +12,14 @@ import math
 from typing import Any
 
 from solver import _tolerances as tol
-from solver._kernels.algebra import ZERO3, load3, store3
+from solver._kernels.algebra import load3, store3
 from solver._kernels.crossing import admissible
 from solver._kernels.data import CONVERGED, STALLED, UNFINISHED, Problem
 from solver._kernels.energy import energy_of, noise_of, scale_of, stiffest, total_energy
 from solver._kernels.flags import cached, inlined, kernel, merged
-from solver._kernels.forces import at_rest, rounding_moment, unloaded
+from solver._kernels.forces import at_rest, rounding_moment
 from solver._kernels.newton import costate, sweep
-from solver._kernels.rollout import copy_base, place
+from solver._kernels.rollout import place
 from solver._kernels.saddle import off_saddle
 from solver._kernels.trial import step
 
@@ -74,19 +74,6 @@ def watchdog(problem: Problem, k: int, now: Any, rise: float, report: Any) -> bo
     sweep(problem, start, 0, k, 0.0, report)
     counters.sweeps += 1
     return False
-
-
-@cached
-def rest_shape(problem: Problem, slot: int, k: int) -> bool:
-    """Try the wire's own rest shape: where it touches nothing it is the answer, and nothing is iterated."""
-    state, u = problem.state, problem.state.u[1 - slot]
-    for j in range(k):
-        store3(u, j, ZERO3)
-    copy_base(state, slot, 1 - slot)
-    place(problem.chain, state, 1 - slot, k)
-    total_energy(problem, 1 - slot, 0, k)
-    parts = state.energies[1 - slot]
-    return parts.wall == 0.0 and parts.friction == 0.0 and admissible(problem, slot, k)
 
 
 @merged
@@ -150,23 +137,8 @@ def frozen_joints(problem: Problem, slot: int, k: int) -> int:
     return 0
 
 
-REST = 0.5 * tol.REST_ANGLE**2
 UNDECIDED = UNFINISHED - 1
 """Result of ``finish`` where the last step did not help, as where a contact opens and closes again: search as usual."""
-
-
-@merged
-def rests(problem: Problem, k: int, now: Any) -> bool:
-    """Whether the wire touches nothing and carries nothing: then its rest shape is the answer, and is made current."""
-    parts = problem.state.energies[now.slot]
-    if not (problem.skips.idle and parts.wall == 0.0 and unloaded(problem.chain, k)):
-        return False
-    resting = parts.friction == 0.0 and now.energy <= REST * stiffest(problem.chain, k)
-    if not resting and not rest_shape(problem, now.slot, k):
-        return False
-    problem.scratch.counters[0].rest_shapes += 1
-    now.slot, now.energy = now.slot if resting else 1 - now.slot, 0.0
-    return True
 
 
 @cached

@@ -61,7 +61,7 @@ Where torsion is finite also that of the whole wire's twist, see ``blocks.pivot_
 """
 DESCENT = record(
     *((name, np.int64) for name in ("slot", "iterations", "first_free", "patience", "released", "next_check")),
-    *((name, np.int64) for name in ("forked", "rung")),
+    *((name, np.int64) for name in ("forked", "sprung", "rung")),
     *((name, float) for name in ("energy", "damping", "last_damping", "share", "checked_energy")),
 )
 """What one iteration of a relaxation hands to the next.
@@ -69,7 +69,8 @@ DESCENT = record(
 slot : of the current state; the trial is in 1 - slot.     energy : of the current state, N mm.
 Newton's method. first_free : joints before it are left alone.     damping : Levenberg's term.     last_damping : the
 one that last led down.     patience : steps to take before it is lowered.     released : how often it was dropped.
-forked : 1 where it passed an unstable state, see ``forks``.     rung : see ``forks.softest_way``.
+forked : 1 where it passed an unstable state, see ``forks``.     sprung : 1 where it went back to its rest shape, or
+towards it, see ``spring_back``.     rung : see ``forks.softest_way``.
 Closed form. share : of its own step.     next_check : iteration at which it is judged.     checked_energy : then.
 """
 PLACE = record(

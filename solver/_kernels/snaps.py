@@ -8,12 +8,11 @@ import math
 from typing import Any, NamedTuple
 
 from solver import _tolerances as tol
-from solver._kernels.algebra import load3, store3
+from solver._kernels.algebra import farthest, load3, store3
 from solver._kernels.chain import segments_at
 from solver._kernels.data import CONVERGED, CURRENT, LAST_GOOD, ROUGH, Problem
 from solver._kernels.flags import inlined, merged
 from solver._kernels.forces import push_force
-from solver._kernels.forks import farthest
 from solver._kernels.free_body import work_on
 from solver._kernels.friction import friction_loss
 from solver._kernels.minimise import NEWTON
@@ -52,7 +51,8 @@ def account(handle: Any, k: int, reached: tuple[float, float, float], used: int,
     problem, at, report, introducer = handle.problem, handle.place[0], handle.report[0], handle.introducer
     balance, pending = balance_work(handle, k, reached), not math.isnan(at.rough_depth)
     ahead, newton = beyond_catheter(handle, k, reached[0], balance), handle.limits.method == NEWTON
-    moved = way_of_joints(problem, at, k, handle.table.segment) if used > tol.SWIFT else 0.0
+    free = problem.scratch.descent[0].sprung != 0
+    moved = way_of_joints(problem, at, k, handle.table.segment) if free or used > tol.SWIFT else 0.0
     leapt = moved > tol.SNAP_WAYS * balance.way
     doubtful = newton and (doubt(balance, used, at.shrink, report.pivot, moved) or (leapt and gives_way(ahead)))
     rough = newton and ahead.way > 0.0 and astray(handle, ahead, used, moved)

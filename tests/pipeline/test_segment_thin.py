@@ -16,15 +16,15 @@ AXIS = np.array([0.95, 0.2, 0.25]) / np.linalg.norm([0.95, 0.2, 0.25])
 POINTS = np.stack(np.indices((70, 50, 60)), axis=-1) * VOXEL + LOW
 
 
-def lumen_of(radius, cnr, seed=100):
-    """A tube of 2 mm with a branch of ``radius`` mm, contrast 900, PSF 0.8 voxel."""
+def lumen_of(radius, cnr, seed=100, zero=0.0):
+    """A tube of 2 mm with a branch of ``radius`` mm, contrast 900, PSF 0.8 voxel. zero : added to the grey."""
     along = np.clip(POINTS @ AXIS, 0.0, 15.0)
     branch = np.linalg.norm(POINTS - along[..., None] * AXIS, axis=-1) - radius
     clean = 100.0 + 900.0 * phantoms.partial_volume(
         np.minimum(np.hypot(POINTS[..., 0], POINTS[..., 1]) - 2.0, branch), VOXEL
     )
     grey = phantoms.scan(clean, 0.8, 900.0 / cnr, seed)
-    return segment(Volume(np.asfortranarray(grey), [VOXEL] * 3, LOW), [[0.0, 0.0, 0.0]])
+    return segment(Volume(np.asfortranarray(grey + np.float32(zero)), [VOXEL] * 3, LOW), [[0.0, 0.0, 0.0]])
 
 
 def wall_along(lumen):
@@ -47,9 +47,10 @@ def wall_along(lumen):
 @pytest.mark.parametrize(
     ("radius_voxels", "least"), [(0.67, 0.9), (1.0, 0.99), (1.67, 0.99), *later((0.83, 0.95), (1.33, 0.99))]
 )
-def test_thin_branches_are_kept_with_their_radius(radius_voxels, least):
+@pytest.mark.parametrize("zero", [0.0, *later(-3000.0)])
+def test_thin_branches_are_kept_with_their_radius(radius_voxels, least, zero):
     """``least``: share of the axis where the distance is negative between the nodes; and all is one piece."""
-    lumen = lumen_of(radius_voxels * VOXEL, 9.0)
+    lumen = lumen_of(radius_voxels * VOXEL, 9.0, zero=zero)
     radius, kept = wall_along(lumen)
     assert label(lumen.distance.values < 0, np.ones((3, 3, 3)))[1] == 1
     assert kept > least

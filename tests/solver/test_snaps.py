@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from solver import GuideWire, Insertion, Solution, VesselWall, relax
+from solver import GuideWire, Insertion, Solution, VesselWall, relax, skips
 from tests.solver.scenes import Array, bend_distance, bend_grid, sampled
 
 
@@ -136,6 +136,33 @@ def test_only_what_long_and_short_steps_agree_on_is_certain() -> None:
     for segment in (0.7, 0.8, 0.9, 1.1):
         for mine, short in zip(turned(segment, 10.0), turned(segment, 10.0, step_mm=0.05), strict=True):
             assert mine.uncertain or np.abs(mine.joints_mm - short.joints_mm).max() < 1e-4
+
+
+def sac(p: Array) -> Array:
+    """A tube of 2.14 mm with a sac on its side at z = 12.9 mm: pulled back, a curved tip is held by the sac's rim."""
+    x, y, z = p[..., 0], p[..., 1], p[..., 2]
+    return np.asarray(np.minimum(np.hypot(x, y) - 2.14, np.sqrt((x - 4.14) ** 2 + y**2 + (z - 12.9) ** 2) - 3.6))
+
+
+@pytest.mark.parametrize("left_out", [(), ("idle",)])
+def test_a_tip_that_an_edge_holds_comes_off_where_it_must_and_is_told(left_out: tuple[str, ...]) -> None:
+    """Slid back it touched nothing, and was put to its rest shape at once, past the edge: 2 mm off, without a word."""
+    wall = VesselWall(sampled(sac, 0.4, (-6, -5, -4), (10, 5, 30)), 31.0)
+    wire = GuideWire(0.5, 0.18, [[0, 0.52], [10, 0.52], [20, 2.3]], [[0, 0.208], [7, 0.208], [7, 0.0]])
+    depths = [15.0, 20.0, 25.0, 20.0, *np.arange(19.5, 15.9, -0.5)]
+    found = []
+    for how in ({}, {"step_mm": 0.01, "finest_mm": 0.01}):
+        with skips.off(*left_out):
+            insertion = Insertion(wire, wall, [-0.43, 0.2, 0.0], [0, 0, 1], **how)
+        found.append(list(insertion.to_depths(depths, -14.0)))
+    for mine, short in zip(*found, strict=True):
+        assert mine.uncertain or np.abs(mine.joints_mm - short.joints_mm).max() < 1e-6
+    held, gone = found[0][-4], found[0][-3]
+    assert held.energy_N_mm > 0.001
+    assert held.snaps == ()
+    assert gone.energy_N_mm == pytest.approx(0.0, abs=1e-9)
+    assert gone.snaps[0].moved_mm == pytest.approx(2.0, abs=0.1)
+    assert gone.uncertain
 
 
 def test_a_smooth_insertion_is_left_alone() -> None:

@@ -30,8 +30,8 @@ from solver._kernels.lanes.relax import POOL, Team, do_round, hand_over, take_ov
 from solver._kernels.lanes.start import Desk, chosen_start
 from solver._kernels.lanes.vectors import WIDTH, in_lanes
 from solver._kernels.minimise import begin, shape_of
-from solver._kernels.newton_method import rests
 from solver._kernels.snaps import may_fork
+from solver._kernels.spring_back import rests
 
 
 class Plan(NamedTuple):
@@ -167,7 +167,7 @@ def begin_relaxing(me: Any, now: Any, wire: Any, start: int, report: Any) -> boo
     counters.relaxations_without_twist += 1
     me.allowed = min(limits.max_iterations, max(limits.work - counters.passed, 0) // (k + problem.chain.first[k + 1]))
     begin(now, start, energy_of(problem, start))
-    now.forked = 0
+    now.forked = now.sprung = 0
     report.start, report.pivot = now.energy, 1.0
     resting = rests(problem, k, now)
     if resting:
