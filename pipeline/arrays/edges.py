@@ -56,8 +56,18 @@ class Layer:
 
 
 def layer_in(off: NDArray[Any], grey: NDArray[Any]) -> Layer | None:
-    """The layer that grey (n,) at distances (n,) from a wall, in voxels, tells of; None where it falls in one step."""
-    off, grey = _profile(off, grey)
+    """The layer that grey (n,) at distances (n,) from a wall, in voxels, tells of; None where it falls in one step.
+
+    It is told by distances in classes, whose middles stand for them, and by the means of the classes. A straight vessel
+    along the voxels has few distances: their middles alone made two edges of one, and around a wire their means did.
+    """
+    middles, means, greys = _profile(off, grey)
+    layer = _layer(middles, greys)
+    return None if layer is None or _layer(means, greys) is None else layer
+
+
+def _layer(off: Array, grey: Array) -> Layer | None:
+    """The layer in a profile: greys (n,) at distances (n,)."""
     contrast = float(np.ptp(grey)) if len(grey) else 0.0
     if contrast <= 0.0 or off[0] > -NEEDED or off[-1] < NEEDED:
         return None
@@ -74,16 +84,13 @@ def layer_in(off: NDArray[Any], grey: NDArray[Any]) -> Layer | None:
     return Layer(vessel, layer, beyond, inner, inner + thick, blur)
 
 
-def _profile(off: NDArray[Any], grey: NDArray[Any]) -> tuple[Array, Array]:
-    """Distances, EVERY voxels apart, and the median grey there, where enough of it is known.
-
-    A straight vessel along the voxels has few distances: taken for the middles of their bins, they made two edges.
-    """
+def _profile(off: NDArray[Any], grey: NDArray[Any]) -> tuple[Array, Array, Array]:
+    """Middles and means of classes of distances, EVERY voxels wide, and the median greys there; of LEAST voxels each."""
     bins = np.rint(off / EVERY).astype(int)
     steps, count = np.unique(bins, return_counts=True)
-    medians = [(np.median(off[there]), np.median(grey[there])) for there in (bins == n for n in steps[count >= LEAST])]
-    places, greys = np.array(medians, float).reshape(-1, 2).T
-    return places, greys
+    steps = steps[count >= LEAST]
+    means, greys = (np.array([f(a[bins == n]) for n in steps], float) for f, a in ((np.mean, off), (np.median, grey)))
+    return steps * EVERY, means, greys
 
 
 def _steps(off: NDArray[Any], edges: Array, blur: float) -> Array:

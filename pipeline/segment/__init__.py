@@ -84,7 +84,8 @@ def _as_shown(
     site = prepare(shown, region.voxels, region.taps, config.margin_mm, region.thin)
     wall = wall_of(site, region.levels, config.outer_mm, wire)
     blur = scanner_blur(wall.blur_mm, region.taps, float(np.min(grid.spacing_mm)))
-    return _Found(shown, region, min(least, wall.least), site, wall, blur)
+    across = 1.0 if wall.sides is None else wall.sides.least
+    return _Found(shown, region, min(least, across), site, wall, blur)
 
 
 def _around_wire(grid: Grid, found: _Found, seeds_mm: ArrayLike, config: SegmentConfig, wire_mm: float) -> _Found:
@@ -139,7 +140,12 @@ def segment(
         thin = balls(grid, region.thin, site.corner, region.levels, blur)
         add_balls(wall.values, np.asarray(grid.spacing_mm), thin, config.outer_mm)
     other = brighter(wall.levels, wire_radius_mm is not None) + bright + uneven.warning(found.least)
-    said = _of_the_vessel(scan, found) + warning(open_ones) + valley.warning(grid, region.passing)
+    said = (
+        _of_the_vessel(scan, found)
+        + (wall.sides.warning() if wall.sides else ())
+        + warning(open_ones)
+        + valley.warning(grid, region.passing)
+    )
     said += other or bone.two_greys(grid, found.distance, site.corner, wall.levels, wall.blur_mm)
     box = wall.values, site.corner
     said += add_necks(region.necks, box, grid, region.levels, blur)

@@ -1,6 +1,6 @@
 """From a mask and grey to a signed distance: half-level surface, closest points, correction of the blur's bias.
 
-Where the vessel is filled unevenly across, the wall's level is that of its own side.
+Where the vessel is filled unevenly across, or tissue differs around it, the wall's level is that of its own sides.
 """
 
 from dataclasses import dataclass, replace
@@ -20,7 +20,7 @@ from pipeline.segment.blurred import blur_of_wall, half_level_offset
 from pipeline.segment.closest import find_closest
 from pipeline.segment.contact import numbered
 from pipeline.segment.levels import GreyLevels, Index, failed, grey_around, plateau, scanner_blur
-from pipeline.segment.settled import INWARDS, Filled, filled_unevenly
+from pipeline.segment.sides import BESIDE, Sides, sides_of
 from solver.grid import Array, Grid, read_only
 
 LAYERS = 4
@@ -113,11 +113,11 @@ def _half_level_wall(site: Site, level: float, inside: NDArray[np.uint8]) -> tup
 
 
 def _own(site: Site, levels: GreyLevels, voxels: Index, normal: Array) -> NDArray[np.bool_]:
-    """Which surface voxels (flat box indices) have vessel, not bone, INWARDS of them: the wall of bone is steeper."""
+    """Which surface voxels (flat box indices) have vessel, not bone, BESIDE them: the wall of bone is steeper."""
     if not np.isfinite(levels.brightest):
         return np.ones(len(voxels), bool)
     index = unflattened(voxels, site.state.shape) - PAD + site.corner
-    inwards = np.rint(index - INWARDS * normal).astype(np.int64)
+    inwards = np.rint(index - BESIDE * normal).astype(np.int64)
     return np.asarray(grey_around(site.volume, inwards) <= levels.brightest)
 
 
@@ -155,8 +155,8 @@ class SignedDistance:
     values : float32, mm, negative inside, on the site's grid; ``outer_mm`` wherever the wall is further away outside.
 
     levels : the wall is at their half level.  blur_mm : the whole blur of the wall, scanner's and smoothing's.
-    wall : some places (n, 3) on it, mm from the scan's first voxel, and outward normals (n, 3).  least : the lowest
-    share of the contrast across the vessel.
+    wall : some places (n, 3) on it, mm from the scan's first voxel, and outward normals (n, 3).  sides : what lies
+    along it, where that differs.
     """
 
     values: NDArray[np.float32]
@@ -164,7 +164,7 @@ class SignedDistance:
     blur_mm: float
     counters: Counters
     wall: tuple[Array, Array]
-    least: float = 1.0
+    sides: Sides | None = None
 
     def noise_mm(self, taps: NDArray[np.float32]) -> float:
         """Standard deviation (mm) of the wall's place by noise: what is left of it over the wall's steepness."""
@@ -172,16 +172,16 @@ class SignedDistance:
         return float(MOVES * levels.noise_after(taps) * np.sqrt(2 * np.pi) * self.blur_mm / levels.contrast)
 
 
-def signed_distance(site: Site, levels: GreyLevels, outer_mm: float, filled: Filled | None = None) -> SignedDistance:
+def signed_distance(site: Site, levels: GreyLevels, outer_mm: float, sides: Sides | None = None) -> SignedDistance:
     """The distance from the half-level surface, corrected for blur; raises StageError where there is no surface.
 
-    filled : how far the vessel is filled along its wall, where that is known to differ.
+    sides : what lies along the wall, where that is known to differ.
     """
     spacing: Array = np.asarray(site.volume.spacing_mm)
     inside = sparse_zeros(site.state.shape, np.uint8)
     owner = np.full(site.state.shape, 0, np.int32)  # written to all over: in large pages, which zeros are not given
     box = Owned(owner, inside, spacing)
-    level = levels.half if filled is None else filled.level(levels)
+    level = levels.half if sides is None else sides.level(levels)
     voxels, wall = _half_level_wall(site, level, inside)
     good = np.isfinite(wall.distance)
     if not good.any():
@@ -193,12 +193,12 @@ def signed_distance(site: Site, levels: GreyLevels, outer_mm: float, filled: Fil
     own = good.copy()
     own[good] = _own(site, levels, seen, wall.normal[good])
     own = own if own.any() else good
-    blurs, whole = (0.0, np.ones(len(voxels))) if filled is None else filled.at(site.from_first(wall.foot))
+    blurs, whole = (0.0, np.ones(len(voxels))) if sides is None else sides.at(site.from_first(wall.foot))
     blur = blur_of_wall((wall.steepness / whole)[own], wall.curvature[own], levels.contrast)
     wall = _corrected(wall, voxels, owner, blur, float(spacing.min()), blurs)
     inside.reshape(-1)[seen] = wall.distance[good] < 0
     visits = find_closest(box, seen, wall.foot, outer_mm)
-    stray = lost_feet(box, voxels, wall.foot, good)
+    stray = lost_feet(box, voxels, wall.foot, good, blur * float(np.max(np.abs(blurs))))
     if len(stray):
         wall.curvature[stray] = 0.0
         visits += find_closest(box, voxels[stray], wall.foot, outer_mm)
@@ -227,12 +227,12 @@ def wall_of(site: Site, levels: GreyLevels, outer_mm: float, wire: bool = False)
         del found  # before the next takes its place in memory
         found = signed_distance(site, levels, outer_mm)
     distance = site.grid.with_values(read_only(found.values))
-    filled = filled_unevenly(site.volume, distance, site.corner, again, found.wall, wire)
-    if filled is not None:
+    sides = sides_of(site.volume, distance, site.corner, again, found.wall, wire)
+    if sides is not None:
         levels = again
-        found = signed_distance(site, levels, outer_mm, filled)
+        found = signed_distance(site, levels, outer_mm, sides)
     # what is left of the change moves the wall by change over steepness
     steepness = levels.contrast / (np.sqrt(2 * np.pi) * found.blur_mm)
     values = found.values
     values += np.float32((again.half - levels.half) / steepness)
-    return replace(found, levels=again, least=1.0 if filled is None else filled.least)
+    return replace(found, levels=again, sides=sides)

@@ -81,14 +81,16 @@ def propagate(box: Owned, voxels: NDArray[Any], foot: NDArray[Any], outer: float
 
 
 @entry_point
-def lost_feet(box: Owned, voxels: NDArray[Any], foot: NDArray[Any], good: NDArray[Any]) -> NDArray[Any]:
+def lost_feet(box: Owned, voxels: NDArray[Any], foot: NDArray[Any], good: NDArray[Any], moved: float) -> NDArray[Any]:
     """Voxels beside the surface that have no foot of their own, and got none nearer than two voxels from a neighbour.
+
+    moved : by how much feet have moved off the surface at most, mm, which is granted in addition.
 
     A branch as thin as that peaks at the level of the wall: the wall is put through the voxel itself.
     Returns positions in ``voxels``; their ``owner`` and ``foot`` are set.
     """
     owner, _, spacing = box
-    limit = (2.0 * max(spacing[0], spacing[1], spacing[2])) ** 2
+    limit = (2.0 * max(spacing[0], spacing[1], spacing[2]) + moved) ** 2
     lost = np.empty(voxels.shape[0], np.int64)
     count = 0
     for n in range(voxels.shape[0]):

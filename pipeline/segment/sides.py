@@ -1,0 +1,169 @@
+"""Grey that differs along the wall: inside, where medium has settled, and outside, where the vessel leaves one tissue.
+
+Half the vessel's contrast is then not half the contrast that its wall has. Where grey falls from a share s of the
+contrast inside to a share o outside, it is a share q at ``sigma Phi^-1((q - o) / (s - o))`` inside the wall (sigma: the
+blur, Phi: the normal distribution). s and o are read a little beside the wall that half the contrast gives. q is half
+way between the lowest s and the highest o, so that every wall is met, which is then moved by that.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial import cKDTree
+from scipy.special import ndtri
+
+from pipeline.segment.levels import BRIGHTER, GreyLevels, Index, grey_around
+from pipeline.segment.uneven import EVEN, HIGHEST, LOWEST
+from solver.grid import Array, Grid
+
+BESIDE = 2.5
+"""How far inside and outside the wall, in voxels, the grey has reached its plateau."""
+ROOM = 2.0
+"""Least distance from any wall, in voxels, of the place where it is read: nearer, another wall's blur is there, too."""
+LEAST_PLACES = 200
+AROUND = 40
+"""Places beside each other whose shares are averaged; each is a mean over 3^3 voxels before."""
+WIDELY = 300
+"""The same where it is looked whether the vessel is filled evenly: with 40, correlated noise at a contrast of 4 to 6
+looks like sides filled to 0.78 of the fullest, with 300 to 0.87."""
+LOOKED_AT = 2000
+"""Places, or so, at which that is looked at, of all vessels: all places are for those that are filled unevenly."""
+FEW = 5.0
+"""Percentage of the wall that may be filled otherwise before the vessel counts as filled unevenly."""
+CLEAR = 0.09
+"""Share of a wall's own contrast that q must be away from either side of it: nearer, no wall's place can be told."""
+ALIKE = 0.18
+"""Share of the contrast by which the outside may differ from that at the seed before it counts as another."""
+TISSUE = 0.5
+"""Share of the contrast up to which something outside is what surrounds the vessel: more is a vessel, bone or metal."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sides:
+    """Shares (n,) of the vessel's contrast just inside and just outside its wall, at places of a tree.
+
+    The places are mm from the scan's first voxel.  low : the lowest share inside.  least : that over the highest, or
+    over the median if the scan shows a wire, which is bright and no contrast medium.  around : lowest and highest share
+    outside.  FEW per cent of the wall are left out of each.
+    """
+
+    places: cKDTree
+    inside: Array
+    outside: Array
+    low: float = 1.0
+    least: float = 1.0
+    around: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def share(self) -> float:
+        """The share of the contrast that is passed at every wall."""
+        return 0.5 * (self.low + self.around[1])
+
+    def level(self, levels: GreyLevels) -> float:
+        """The grey of that share."""
+        return levels.outside + self.share * levels.contrast
+
+    def at(self, feet: Array) -> tuple[Array, Array]:
+        """By how many blurs (n,) the wall lies outside places (n, 3) where grey falls to ``level``, and its steepness.
+
+        Steepness (n,) is over that of a wall of the whole contrast, half way.
+        """
+        near = self.places.query(feet)[1]
+        step = np.maximum(self.inside[near] - self.outside[near], 0.1)
+        blurs = ndtri(np.clip((self.share - self.outside[near]) / step, CLEAR, 1.0 - CLEAR))
+        return blurs, step * np.exp(-0.5 * blurs**2)
+
+    def warning(self) -> tuple[str, ...]:
+        """One sentence for the report where other tissue lies around the vessel, or none."""
+        if self.around == (0.0, 0.0):
+            return ()
+        low, high = (f"{100 * share:.0f}" for share in self.around)
+        return (
+            f"segment: what lies around the vessel differs, from {low} to {high} % of the way from what it is at the "
+            "seed to the vessel's grey; the wall was taken half way to what lies next to it: look at the picture",
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class _Wall:
+    """A wall, and the scan whose grey is read beside it.
+
+    distance : signed, mm, on the vessel's box, which begins at ``corner`` of the scan.  feet : places (n, 3), mm from
+    the scan's first voxel.  normals : (n, 3), outward.
+    """
+
+    scan: Grid
+    distance: Grid
+    corner: Index
+    levels: GreyLevels
+    feet: Array
+    normals: Array
+
+    def beside(self, way: float) -> tuple[Index, Array]:
+        """Which places have room beside them, ``way`` -1 inside and 1 outside, and the share (m,) of contrast there."""
+        h = float(np.max(self.scan.spacing_mm))
+        index = np.rint((self.feet + way * BESIDE * h * self.normals) / self.scan.spacing_mm).astype(np.int64)
+        index -= self.corner
+        kept = np.all((index >= 0) & (index < self.distance.shape), axis=1)
+        kept[kept] = way * self.distance.values[tuple(index[kept].T)] > ROOM * h
+        at = np.flatnonzero(kept)
+        return at, (grey_around(self.scan, index[at] + self.corner) - self.levels.outside) / self.levels.contrast
+
+
+def sides_of(
+    scan: Grid, distance: Grid, corner: Index, levels: GreyLevels, wall: tuple[Array, Array], wire: bool
+) -> Sides | None:
+    """What lies along the wall on both of its sides; None where it is the same all along, or the vessel is thin.
+
+    distance : signed distance on the vessel's box, which begins at ``corner`` of the scan.  wall : places (n, 3) on it,
+    mm from the scan's first voxel, and outward normals (n, 3).  wire : whether the scan shows one.
+    """
+    if levels.foreign:  # with bone or metal in it, nobody can tell; that is said by itself
+        return None
+    along = _Wall(scan, distance, corner, levels, *wall)
+    filled, around = _filled(along, wire), _around_it(along)
+    if filled is None:
+        return around
+    if around is None:
+        return filled
+    near = around.places.query(filled.places.data)[1]
+    return replace(filled, outside=around.outside[near], around=around.around)
+
+
+def _filled(wall: _Wall, wire: bool) -> Sides | None:
+    """How far the vessel is filled along its wall, if that differs."""
+    at, share = wall.beside(-1.0)
+    if len(at) < LEAST_PLACES:
+        return None
+    share = np.clip(share, LOWEST, HIGHEST if wire else BRIGHTER)
+    low, full = _extremes(wall.feet[at], share, 50.0 if wire else 100.0 - FEW)
+    if low >= EVEN * full:
+        return None
+    places = cKDTree(wall.feet[at])
+    return Sides(places, _around(places, share, AROUND), np.zeros(len(at)), low, low / full)
+
+
+def _around_it(wall: _Wall) -> Sides | None:
+    """What surrounds the vessel along its wall, if that differs from what does at the seed."""
+    at, share = wall.beside(1.0)
+    at, share = at[share < TISSUE], share[share < TISSUE]
+    if len(at) < LEAST_PLACES:
+        return None
+    low, high = _extremes(wall.feet[at], share, 100.0 - FEW)
+    if low > -ALIKE and high < ALIKE:
+        return None
+    places = cKDTree(wall.feet[at])
+    return Sides(places, np.ones(len(at)), _around(places, share, WIDELY), around=(low, max(high, 0.0)))
+
+
+def _extremes(feet: Array, share: Array, most: float) -> tuple[float, float]:
+    """The FEW-th and the ``most``-th percentile of shares (n,) at places (n, 3), each a mean over WIDELY of them."""
+    step = max(1, len(feet) // LOOKED_AT)
+    places = cKDTree(feet[::step])
+    low, high = np.percentile(_around(places, share[::step], min(WIDELY // step, places.n // 4)), (FEW, most))
+    return float(low), float(high)
+
+
+def _around(places: cKDTree, values: Array, count: int) -> Array:
+    """Means (n,) of the values (n,) of the ``count`` places next to each."""
+    return np.asarray(np.mean(values[places.query(places.data, count)[1]], axis=1))
