@@ -85,7 +85,7 @@ def _layer(off: Array, grey: Array) -> Layer | None:
 
 
 def _profile(off: NDArray[Any], grey: NDArray[Any]) -> tuple[Array, Array, Array]:
-    """Middles and means of classes of distances, EVERY voxels wide, and the median greys there; of LEAST voxels each."""
+    """Middles and means of classes of distances, EVERY wide, and the median greys there, of LEAST voxels each."""
     bins = np.rint(off / EVERY).astype(int)
     steps, count = np.unique(bins, return_counts=True)
     steps = steps[count >= LEAST]

@@ -12,7 +12,7 @@ from pipeline.arrays.edges import Layer
 from pipeline.arrays.fingerprint import known_with_place
 from pipeline.arrays.grids import in_memory_order, reorder
 from pipeline.model import Lumen, Volume
-from pipeline.segment import bone, uneven, valley
+from pipeline.segment import bone, leaked, uneven, valley
 from pipeline.segment.config import SegmentConfig
 from pipeline.segment.contact import contacts, warning
 from pipeline.segment.cut_off import cut_off
@@ -46,6 +46,7 @@ class _Found:
     """The vessel found from seeds: the grid with its contrast evened out, its region, and its wall on the site's box.
 
     least : lowest share of the contrast along the vessel.  blur : the scanner's, mm.  layer : what lies around it.
+    tissue : grey of what hung together with it.
     """
 
     grid: Grid
@@ -55,6 +56,7 @@ class _Found:
     wall: SignedDistance
     blur: float
     layer: Layer | None = None
+    tissue: float | None = None
 
     @property
     def distance(self) -> Grid:
@@ -80,12 +82,16 @@ def _as_shown(
     grid: Grid, seeds_mm: ArrayLike, config: SegmentConfig, wire: bool, method: Callable[..., Region]
 ) -> _Found:
     region = method(grid, seeds_mm, config)
+    tissue = leaked.tissue_in(grid, region)
+    if tissue is not None:
+        method = partial(method, outside=tissue)
+        region = method(grid, seeds_mm, config)
     shown, region, least = evened(grid, region, lambda filled: method(filled, seeds_mm, config))
     site = prepare(shown, region.voxels, region.taps, config.margin_mm, region.thin)
     wall = wall_of(site, region.levels, config.outer_mm, wire)
     blur = scanner_blur(wall.blur_mm, region.taps, float(np.min(grid.spacing_mm)))
     across = 1.0 if wall.sides is None else wall.sides.least
-    return _Found(shown, region, min(least, across), site, wall, blur)
+    return _Found(shown, region, min(least, across), site, wall, blur, tissue=tissue)
 
 
 def _around_wire(grid: Grid, found: _Found, seeds_mm: ArrayLike, config: SegmentConfig, wire_mm: float) -> _Found:
@@ -114,7 +120,8 @@ def _beside_wire(grid: Grid, seeds_mm: ArrayLike, config: SegmentConfig, wire_mm
 def _of_the_vessel(scan: Grid, found: _Found) -> tuple[str, ...]:
     """Sentences on what surrounds it, and fills it."""
     layer = () if found.layer is None else (surrounded(found.layer, float(np.mean(found.grid.spacing_mm))),)
-    return layer + cut_off(scan, found.distance, found.site.corner) + flat_side(found.distance)
+    tissue = leaked.warning(found.tissue, found.region.levels.inside)
+    return layer + tissue + cut_off(scan, found.distance, found.site.corner) + flat_side(found.distance)
 
 
 def segment(

@@ -73,15 +73,20 @@ def _connected(
 
 
 def fuzzy_region(
-    grid: Grid, seeds_mm: ArrayLike, config: SegmentConfig, noise_left: tuple[float, ...] | None = None
+    grid: Grid,
+    seeds_mm: ArrayLike,
+    config: SegmentConfig,
+    noise_left: tuple[float, ...] | None = None,
+    outside: float | None = None,
 ) -> Region:
     """The vessel that holds the seeds ((m, 3) LPS mm); raises StageError where they lie in none.
 
     grid : C-contiguous grey, brighter inside the vessel.  noise_left : see ``GreyLevels``, where the grid no longer
-    shows it.
+    shows it.  outside : the grey around the vessel, where that at the seed is not the brightest.
     """
     levels, seeds = _start(grid, seed_voxels(grid, seeds_mm))
     levels = levels if noise_left is None else replace(levels, noise_left=noise_left)
+    levels = levels if outside is None else replace(levels, outside=outside)
     affinity = estimate_affinity(levels, config)
     order, read = _connected(grid, seeds, levels, affinity, config)
     low, more = low_region(grid, seeds, levels, affinity)

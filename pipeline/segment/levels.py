@@ -99,12 +99,12 @@ class _Levels(NamedTuple):
     dark: float
 
 
-def _two_levels(grey: NDArray[Any], seed: float, at: tuple[int, ...]) -> _Levels:
-    """The two levels in a box, by fixed point.
+def _two_levels(grey: NDArray[Any], seed: float, at: tuple[int, ...], padding: NDArray[np.bool_]) -> _Levels:
+    """The two levels in a box, by fixed point. padding : voxels that surround nothing, unless there are no others.
 
     The region's median is held near the seed's grey, lest bone that touches it be taken for the vessel.
     """
-    outside = float(np.percentile(grey, 10))
+    outside = float(np.percentile(grey[~padding], 10)) if not padding.all() else seed
     inside = seed
     region = apart = np.zeros(grey.shape, bool)
     for _ in range(6):
@@ -117,23 +117,28 @@ def _two_levels(grey: NDArray[Any], seed: float, at: tuple[int, ...]) -> _Levels
         inside = _median(grey[ndimage.binary_erosion(region)], whole)
         inside = min(inside, seed + 0.5 * (seed - outside))
         apart = ~ndimage.binary_dilation(bright, iterations=2)
-        outside = _median(grey[apart], outside)
+        shown = apart & ~padding
+        outside = _median(grey[shown if np.mean(shown) >= LEAST_DARK else apart], outside)
     return _Levels(inside, outside, region, float(np.mean(apart)))
 
 
 def levels_at(grid: Grid, index: NDArray[Any]) -> tuple[GreyLevels, NDArray[np.int64]]:
     """GreyLevels around one seed voxel, and the voxel (3,) to start at: that of median smoothed grey among its 3^3."""
+    darkest = float(grid.values.min())
     for half in BOXES_MM:
-        levels, found, dark = _levels_in(grid, box_around(grid, index, half, LEAST_BOX), index)
+        levels, found, dark = _levels_in(grid, box_around(grid, index, half, LEAST_BOX), index, darkest)
         if dark >= LEAST_DARK:
             break
     return levels, found
 
 
 def _levels_in(
-    grid: Grid, box: tuple[slice, slice, slice], index: NDArray[Any]
+    grid: Grid, box: tuple[slice, slice, slice], index: NDArray[Any], darkest: float
 ) -> tuple[GreyLevels, NDArray[np.int64], float]:
-    """What ``levels_at`` returns, of a box around the seed, and the share of the box that lies off the vessel."""
+    """What ``levels_at`` returns, of a box around the seed, and the share of the box that lies off the vessel.
+
+    darkest : grey of the scan; what lies outside a round field of view has it.
+    """
     raw = np.asarray(grid.values[box], np.float32)
     grey = smoothed(raw)
     start = np.array([s.start for s in box])
@@ -144,7 +149,8 @@ def _levels_in(
     seed = float(np.median(around))
     best = np.unravel_index(int(np.argmin(np.abs(around - seed))), around.shape)
     at = tuple(int(b) + s.start for b, s in zip(best, inner, strict=True))
-    inside, outside, region, dark = _two_levels(grey, seed, at)
+    padding = ndimage.binary_dilation(raw == darkest)
+    inside, outside, region, dark = _two_levels(grey, seed, at, padding)
     found = start + np.array(at)
     noise = voxel_noise(raw - grey, region)
     left = noise_left(raw, region, grey > 0.5 * (inside + outside), noise)

@@ -51,7 +51,7 @@ class Filling:
     least: float
 
 
-def _core(voxels: Index, grid: Grid, low: Index, shape: tuple[int, ...]) -> Index:
+def core_voxels(voxels: Index, grid: Grid, low: Index, shape: tuple[int, ...]) -> Index:
     """Indices (n, 3), in the box that begins at ``low``, of the voxels that lie CORE layers inside; ascending."""
     wider = shape[0] + 2, shape[1] + 2, shape[2] + 2
     flat = np.sort(rebased(voxels, grid.shape, 1 - low, wider))
@@ -64,7 +64,7 @@ def filling(grid: Grid, region: Region) -> Filling:
     margin = CARRIED_BLOCKS * BLOCK + CORE
     low = np.maximum(first - margin, 0)
     high = np.minimum(last + margin + 1, grid.shape)
-    core = _core(region.voxels, grid, low, tuple(int(n) for n in high - low))
+    core = core_voxels(region.voxels, grid, low, tuple(int(n) for n in high - low))
     shape = tuple(int(-(-n // BLOCK)) for n in high - low)
     if len(core) == 0:
         return Filling(np.ones(shape), low, 1.0)
