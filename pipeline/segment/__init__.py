@@ -12,7 +12,7 @@ from pipeline.arrays.edges import Layer
 from pipeline.arrays.fingerprint import known_with_place
 from pipeline.arrays.grids import in_memory_order, reorder
 from pipeline.model import Lumen, Volume
-from pipeline.segment import bone, leaked, uneven, valley
+from pipeline.segment import bone, leaked, thin, uneven, valley
 from pipeline.segment.config import SegmentConfig
 from pipeline.segment.contact import contacts, warning
 from pipeline.segment.cut_off import cut_off
@@ -24,7 +24,6 @@ from pipeline.segment.levels import Region, brighter, scanner_blur
 from pipeline.segment.necks import add_necks, closed_necks
 from pipeline.segment.on_wire import beside, swallowed
 from pipeline.segment.surface import SignedDistance, Site, prepare, wall_of
-from pipeline.segment.thin import add_balls, balls
 from pipeline.segment.uneven import evened
 from pipeline.status import StageError
 from solver.grid import Grid, read_only
@@ -121,7 +120,13 @@ def _of_the_vessel(scan: Grid, found: _Found) -> tuple[str, ...]:
     """Sentences on what surrounds it, and fills it."""
     layer = () if found.layer is None else (surrounded(found.layer, float(np.mean(found.grid.spacing_mm))),)
     tissue = leaked.warning(found.tissue, found.region.levels.inside)
-    return layer + tissue + cut_off(scan, found.distance, found.site.corner) + flat_side(found.distance)
+    sides = () if found.wall.sides is None else found.wall.sides.warning()
+    return layer + tissue + sides + cut_off(scan, found.distance, found.site.corner) + flat_side(found.distance)
+
+
+def _beside_it(found: _Found) -> tuple[str, ...]:
+    """Sentences on vessels that pass by, and on branches that are left out."""
+    return valley.warning(found.grid, found.region.passing) + thin.warning(found.grid, found.region.faint)
 
 
 def segment(
@@ -144,15 +149,10 @@ def segment(
         lambda: contacts(found.distance), lambda: bone.touching(grid, found.distance, site.corner, wall.levels)
     )
     if len(region.thin):
-        thin = balls(grid, region.thin, site.corner, region.levels, blur)
-        add_balls(wall.values, np.asarray(grid.spacing_mm), thin, config.outer_mm)
+        branches = thin.balls(grid, region.thin, site.corner, region.levels, blur)
+        thin.add_balls(wall.values, np.asarray(grid.spacing_mm), branches, config.outer_mm)
     other = brighter(wall.levels, wire_radius_mm is not None) + bright + uneven.warning(found.least)
-    said = (
-        _of_the_vessel(scan, found)
-        + (wall.sides.warning() if wall.sides else ())
-        + warning(open_ones)
-        + valley.warning(grid, region.passing)
-    )
+    said = _of_the_vessel(scan, found) + warning(open_ones) + _beside_it(found)
     said += other or bone.two_greys(grid, found.distance, site.corner, wall.levels, wall.blur_mm)
     box = wall.values, site.corner
     said += add_necks(region.necks, box, grid, region.levels, blur)

@@ -8,13 +8,14 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pipeline.arrays.grids import unflattened
 from pipeline.segment import valley
 from pipeline.segment._kernels.connect import Affinity
 from pipeline.segment.config import SegmentConfig
 from pipeline.segment.connect import connect, connect_relative, estimate_affinity, neighbours
 from pipeline.segment.levels import GreyLevels, Index, Region, failed, levels_at, seed_voxels
 from pipeline.segment.necks import through_necks
-from pipeline.segment.thin import beyond_vessel, low_region, thin_branches
+from pipeline.segment.thin import beyond_vessel, branches, low_region
 from solver.grid import Grid
 
 LEAST_CONTRAST = 2.0
@@ -99,7 +100,10 @@ def fuzzy_region(
     if not len(config.other_seeds_mm):  # what lies behind a neck might be what those seeds are to cut off
         region, beyond = through_necks(grid, low, region, affinity, config)
     if len(low) > len(region.voxels):
-        found = thin_branches(beyond or beyond_vessel(grid, low, region.voxels, levels, affinity))
+        found, faint = branches(beyond or beyond_vessel(grid, low, region.voxels, levels, affinity))
         region = valley.with_own(grid, low, region, found)
+        region = replace(
+            region, faint=tuple(unflattened(np.array([one[len(one) // 2]]), grid.shape)[0] for one in faint)
+        )
     counters = {**region.counters, "voxels_visited": float(len(region.voxels)), "voxels_thin": float(len(region.thin))}
     return replace(region, counters=counters)

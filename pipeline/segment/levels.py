@@ -243,7 +243,8 @@ class Region:
 
     thin : flat indices of branches too thin for a wall at half height.  levels : grey inside and outside.  taps : the
     separable smoothing of the grey in which the wall is looked for.  necks : axes (n, 3), voxels, of the necks passed.
-    passing : the voxels (3,) where other thin vessels pass by.
+    passing : the voxels (3,) where other thin vessels pass by.  faint : one of each branch that is left out since
+    it is filled too little.
     """
 
     voxels: Index
@@ -253,6 +254,7 @@ class Region:
     counters: Counters
     necks: tuple[NDArray[np.float64], ...] = ()
     passing: tuple[Index, ...] = ()
+    faint: tuple[Index, ...] = ()
 
 
 def failed(got: str, allowed: str, do: str) -> StageError:

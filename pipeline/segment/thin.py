@@ -5,6 +5,7 @@ of 0.8 voxel leave half of it, one and a third a quarter. Connectedness at half 
 connected to the vessel at a lower grey, and beyond the vessel's blurred skirt it is long, thin and nowhere bright.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -39,6 +40,9 @@ SHORTEST = 6
 """Voxels from end to end of a branch."""
 FATTEST = 45.0
 """Most voxels per step along a branch: room for its cross-section where the skirt ends, and for oblique steps."""
+FAINT, FAINT_FATTEST = 0.3, 250.0
+"""Least share of the contrast that a thicker branch reaches, and most voxels per step along it, to be told as faint: a
+radius of seven voxels, with its blur. Tissue has thousands."""
 BRIGHTEST = 0.75
 """Share of the contrast above which something is no thin branch, but a vessel that connectedness did not reach."""
 FULL = 0.65
@@ -115,17 +119,36 @@ def low_region(volume: Grid, seeds: Index, levels: GreyLevels, affinity: Affinit
     return (np.zeros(0, np.int64), 0.0) if tables is None else connect(volume, seeds, tables, 0.5, neighbours(6))
 
 
-def thin_branches(beyond: Beyond) -> list[Index]:
-    """The voxels (flat) of each thin branch, among those beyond the vessel."""
+def branches(beyond: Beyond) -> tuple[list[Index], list[Index]]:
+    """The voxels (flat) of each thin branch among those beyond the vessel, and of each that is thick, but too faint.
+
+    The latter is no part of the lumen: filled to less than half, it never reaches the wall's level.
+    """
     if not beyond.thick or len(beyond.voxels) < SHORTEST:
-        return []
+        return [], []
     part, steps = along_cores(beyond.inner, np.ones(len(beyond.voxels), bool))
     count = np.bincount(part)
     length, most = largest(part, steps + 1, len(count)), largest(part, beyond.share, len(count))
-    good = (length >= SHORTEST) & (count <= FATTEST * length) & (most <= BRIGHTEST)
+    long = (length >= SHORTEST) & (most <= BRIGHTEST)
+    faint = long & (length >= 2 * SHORTEST) & (count > FATTEST * length) & (count <= FAINT_FATTEST * length)
+    faint &= most >= FAINT
     together = np.argsort(part, kind="stable")
-    each = np.split(beyond.voxels[together], np.cumsum(count)[:-1])
-    return [np.asarray(each[number], np.int64) for number in np.flatnonzero(good)]
+    each = [np.asarray(own, np.int64) for own in np.split(beyond.voxels[together], np.cumsum(count)[:-1])]
+    thin = long & (count <= FATTEST * length)
+    return [each[number] for number in np.flatnonzero(thin)], [each[number] for number in np.flatnonzero(faint)]
+
+
+def warning(grid: Grid, faint: Sequence[Index]) -> tuple[str, ...]:
+    """One sentence for the report on branches that are filled too little, or none. faint : a voxel of each."""
+    if not faint:
+        return ()
+    place, count = grid.to_mm(faint[0]).round(1).tolist(), len(faint)
+    many = f"{count} branches are" if count > 1 else "a branch is"
+    return (
+        f"segment: {many} filled to half of the vessel's contrast or less, and left out of the lumen "
+        f"({'the first ' * (count > 1)}at {place} mm); where a wire may go there, scan with them filled, or give the "
+        "lumen as a file (manifest key lumen)",
+    )
 
 
 def _highest(points: Array, share: Array) -> NDArray[np.bool_]:
