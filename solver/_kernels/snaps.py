@@ -26,7 +26,7 @@ class WorkBalance(NamedTuple):
     push, torque, pull : the hand's at its end, see ``records.PLACE``.     way : longest way of a hand, mm.
     share : length over that of the longest step.     lost : work minus the change of energy, N mm.     missing : lost
     less what friction took, N mm.     large : missing work that the error of the trapezium rule may explain, N mm.
-    change : change of the hand's forces times their ways, N mm.     gives : whether the push becomes smaller.
+    change : change of the hand's forces times their ways, N mm.     gives : whether the hand has less and less to do.
     """
 
     push: float
@@ -118,7 +118,7 @@ def balance_work(handle: Any, k: int, reached: tuple[float, float, float]) -> Wo
     change = abs((push - at.push) * ahead) + abs((torque - at.torque) * turn)
     way = max(abs(ahead), abs(onwards))
     share = max(way / introducer.step, abs(reached[1] - at.roll) / introducer.turn)
-    gives = (push - at.push) * ahead < 0.0
+    gives = (push - at.push) * ahead + (torque - at.torque) * turn < 0.0
     return WorkBalance(push, torque, pull, way, share, lost, lost - rubbed, large, change, gives)
 
 
