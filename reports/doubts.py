@@ -15,8 +15,10 @@ COUNT_AS = ", and count as "
 """What is said of insertions that look like fewer."""
 MADE_FROM_TRACES = "only wires that were made from the traces"
 """What a warning of wires that lie nearer to the traces than these are known says; their errors are none."""
-AGAINST_INPUTS = " from the traced one, as stated ", " insertion_mm states", " in entry_direction as stated"
-"""What warnings say that speak against an input: roll, tip's curve or catheter; the depths; the clamp."""
+AGAINST_INPUTS = (
+    " from the traced one, as stated ", " insertion_mm states", " in entry_direction as stated", "the given lumen lies "
+)  # fmt: skip
+"""What warnings say that speak against an input: roll, tip's curve or catheter; depths; the clamp; a given lumen."""
 
 
 class Doubt(NamedTuple):
