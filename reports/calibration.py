@@ -39,7 +39,12 @@ WIRE = (
     Column("at_mm", "mm", "distance from the tip"),
     Column("stated", "-", "what the manifest states, in the unit that the key ends with"),
     Column("used", "-", "what parameters.toml holds"),
-    Column("sd", "-", "one standard deviation; held: the fit leaves it as stated", "text"),
+    Column(
+        "sd",
+        "-",
+        "one standard deviation, what is not seen being as uncertain as above; held: the fit leaves it as stated",
+        "text",
+    ),
 )
 RATIOS = (
     "Shapes tell the ratios of stiffness alone: of the shaft to the tip, and of the wall to the wire. EI of the tip is "

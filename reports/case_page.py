@@ -9,12 +9,12 @@ from reports._content import flatten, settings
 from reports.alike import alike
 from reports.case_files import GOOD, CaseFiles, counted, read_case, runs_in
 from reports.counts import scans
-from reports.doubts import copied_from_traces
+from reports.doubts import Doubt, copied_from_traces, weightiest_first
 from reports.figures import declared
 from reports.listing import listed_files, listed_view
 from reports.page import Each, begun_first, longest, one_by_one, section, write_page
 from reports.schema import ERRORS, FAILURES
-from reports.verdict import OF_CALIBRATION, Doubt, badge, verdict
+from reports.verdict import OF_CALIBRATION, badge, verdict
 from reports.viewer import viewer_data
 from reports.what_next import next_command, typed, worst_frames
 
@@ -30,21 +30,21 @@ def render_case(case_dir: Path, embed: bool = False, each: Each = one_by_one) ->
     """
     case = read_case(case_dir)
     result, errors = case.result, case.errors
-    failures, copied = case_failures(case), copied_from_traces({case.name: result.get("warnings", ())})
+    failures, warnings = case_failures(case), weightiest_first(result.get("warnings", ()))
+    doubt = Doubt(copied_from_traces({case.name: warnings}), warnings=warnings)
     frames = _content.grid(errors, ERRORS.shown("frames", "work"), bad=~errors["status"].isin(GOOD))
     page = {
         "title": " - ".join(filter(None, (case.name, case.simulator, "wireval"))),
         "name": case.name,
-        "badge": badge(
-            result.get("status", "no result.json"), result.get("status") in GOOD, _scored(case), Doubt(copied)
-        ),
-        "verdict": _case_verdict(case, copied),
+        "badge": badge(result.get("status", "no result.json"), result.get("status") in GOOD, _scored(case), doubt),
+        "verdict": _case_verdict(case, doubt),
         "worst": worst_frames({case.name: errors}, {}),
         "next": next_command([case.name], typed(case_dir)),
         **_drawn(case, embed, each),
         **{key: result.get(key, "") for key in ("role", "group", "simulator")},
         "failures": alike(failures),
-        **{key: result.get(key, ()) for key in ("warnings", "assumptions", "inputs")},
+        "warnings": warnings,
+        **{key: result.get(key, ()) for key in ("assumptions", "inputs")},
         "numbers": _content.in_tiles(_content.cards(declared("cards"), case.statistics)),
         "points": (case_dir / "points.csv.gz").exists(),
         # of projections the assumptions say whether wires were shifted
@@ -93,7 +93,7 @@ def _scored(case: CaseFiles) -> Mapping[str, Any]:
     return {} if case.result.get("role") == "calibration" else case.statistics
 
 
-def _case_verdict(case: CaseFiles, copied: str) -> str:
+def _case_verdict(case: CaseFiles, doubt: Doubt) -> str:
     """What became of the case, how many frames have a result, and how good they are.
 
     Where some have none, why stands below, with the frames and the next command: said here, too, it read as if it were
@@ -102,14 +102,14 @@ def _case_verdict(case: CaseFiles, copied: str) -> str:
     nothing = "the case has no result.json: it did not finish; see log.txt"
     said = str(case.result.get("sentence", nothing)).strip().rstrip(".")
     scored = _scored(case)
-    how = verdict(scored, case.simulator, Doubt(copied)) if scored or not case.statistics else OF_CALIBRATION
+    how = verdict(scored, case.simulator, doubt) if scored or not case.statistics else OF_CALIBRATION
     good, planned = case.statistics.get("frames_ok"), case.statistics.get("frames")
     became = said[:1].upper() + said[1:] + "."
     if fitted := case.statistics.get("frames_fitted"):
         became = scans(good or 0, planned or 0, fitted, scored_or_ok([case])) + "."
     elif planned and good != planned:
         became = "" if how.startswith("On ") else f"{good} of {counted(planned, 'frame')} have a result."
-    judged = bool(how) and not copied and _content.number(scored.get("skill_strongest")) != _content.NOTHING
+    judged = bool(how) and not doubt.copied and _content.number(scored.get("skill_strongest")) != _content.NOTHING
     ids = {name for run in runs_in(case.folder.parents[1]) for name in run.get("planned") or ()}
     alone = "The predictor 'another insertion' may be stronger; it is judged over the run, on its first page."
     alone *= judged and len(ids) != 1

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from reports.case_files import find_cases, listed, runs_in
 from reports.records import read_json
@@ -15,6 +15,40 @@ COUNT_AS = ", and count as "
 """What is said of insertions that look like fewer."""
 MADE_FROM_TRACES = "only wires that were made from the traces"
 """What a warning of wires that lie nearer to the traces than these are known says; their errors are none."""
+AGAINST_INPUTS = (
+    " from the traced one, as stated ", " insertion_mm states", " in entry_direction as stated", "the given lumen lies "
+)  # fmt: skip
+"""What warnings say that speak against an input: roll, tip's curve or catheter; depths; the clamp; a given lumen."""
+
+
+class Doubt(NamedTuple):
+    """Why the numbers may not mean what they say.
+
+    copied : the warning that the wires were made from the traces, so that no number counts; empty if there is none.
+    twins : the doubt that some insertions look like one that was scanned twice, but count as several; empty likewise.
+    warnings : all that stand on the page, those that speak against an input first.
+    """
+
+    copied: str = ""
+    twins: str = ""
+    warnings: Sequence[str] = ()
+
+    @property
+    def against(self) -> str:
+        """The first warning that an input is wrong; empty where none says so."""
+        return next(filter(_against_inputs, self.warnings), "")
+
+
+NO_DOUBT = Doubt()
+
+
+def weightiest_first(warnings: Iterable[str]) -> list[str]:
+    """Warnings, those first that speak against an input: a page shows five, and a wrong roll moves all wires."""
+    return sorted(warnings, key=lambda text: not _against_inputs(text))
+
+
+def _against_inputs(warning: str) -> bool:
+    return any(words in warning for words in AGAINST_INPUTS)
 
 
 def warnings_of(folder: Path) -> list[str]:
@@ -59,6 +93,13 @@ def said_by_cases(results: Mapping[str, Mapping[str, Any]], key: str) -> list[st
         more = f" ({others} more with other numbers, on the pages of the cases)" * (others > 0)
         lines.append(f"{listed([*cases])}: {next(iter(texts))}{more}")
     return lines
+
+
+def doubt_of(out_dir: Path, results: Mapping[str, Mapping[str, Any]]) -> Doubt:
+    """What is warned of on a run's page: of its cases among themselves, then of each. results : result.json by case."""
+    doubts, copied = doubted(out_dir), {case: result.get("warnings", ()) for case, result in results.items()}
+    said = weightiest_first([*doubts, *said_by_cases(results, "warnings")])
+    return Doubt(copied_from_traces(copied), twins(doubts), said)
 
 
 def doubted(out_dir: Path) -> list[str]:

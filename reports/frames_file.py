@@ -71,8 +71,10 @@ class FrameArrays:
     error_mm, arc_mm : one value for each compared sample of the arc.     contact_force_N : (k,) or (k, 3) at the
     joints.
     median_mm (n, 3), covariance_mm2 (n, 3, 3) : of the ensemble's wires, at samples like those.
-    mips : the scan's maxima along array axis 0, 1, 2, in the box of the case's ``scan``.     straightened : the scan
-    along the traced wire.
+    mips : a dict of pictures by array axis 0, 1, 2: the scan's maxima along it, uint8, in the box of the case's
+    ``scan``.     straightened : the scan along the traced wire, a named tuple: ``values`` (k, m, m) uint8, k planes
+    across it, which is in their middle, ``along_mm`` apart, of samples ``across_mm`` apart; ``normal`` (3,), their
+    first axis, LPS.
     """
 
     frame: int

@@ -13,7 +13,7 @@ from reports.alike import alike, of_what
 from reports.atomic import replacing
 from reports.case_files import WORST, CaseFiles, counted, not_reached, not_run_sentence, read_case, results_in
 from reports.counts import scans
-from reports.doubts import assumed, copied_from_traces, doubted, said_by_cases, twins
+from reports.doubts import assumed, doubt_of, said_by_cases
 from reports.figures import declared, figures_of
 from reports.gates import gates_in
 from reports.origin import why_not_pooled
@@ -22,7 +22,7 @@ from reports.records import read_json
 from reports.run_page import readable_cases, run_files
 from reports.schema import FAILURES, OVERALL_FILE, SUMMARY
 from reports.tables import first_row, in_texts, read_if_there
-from reports.verdict import Doubt, unscored, verdict
+from reports.verdict import unscored, verdict
 from reports.what_next import next_command, typed, worst_frames
 from reports.worse import worse_sentence
 
@@ -67,14 +67,8 @@ def _first(out_dir: Path, summary: pd.DataFrame, whole: pd.DataFrame) -> Page:
     cases = zip(summary["role"], summary["status"], strict=True)
     results = results_in(out_dir)
     simulator = next((name for one in results.values() if (name := str(one.get("simulator", "")))), "")
-    doubts = doubted(out_dir)
-    copied = copied_from_traces({name: one.get("warnings", ()) for name, one in results.items()})
-    said = (
-        verdict(row, simulator, Doubt(copied, twins(doubts)))
-        or why_not_pooled(out_dir)
-        or unscored(cases)
-        or not_reached(out_dir)
-    )
+    doubt = doubt_of(out_dir, results)
+    said = verdict(row, simulator, doubt) or why_not_pooled(out_dir) or unscored(cases) or not_reached(out_dir)
     frames = f"{ok} of {counted(planned, 'frame')} have a result"
     if fitted := int(summary["frames_fitted"].sum()):
         frames = scans(ok, planned, fitted, "with a result")
@@ -90,7 +84,7 @@ def _first(out_dir: Path, summary: pd.DataFrame, whole: pd.DataFrame) -> Page:
     for tile in _content.in_tiles(_content.overall(declared("overall"), whole))["tiles"]:
         why = f". {tile['why']}" if "why" in tile else ""
         page.text(f"{tile['value']}  {tile['label']}{why}")
-    page.some("Warnings", [*doubts, *said_by_cases(results, "warnings")], "on the pages of the cases", _MOST_WARNINGS)
+    page.some("Warnings", doubt.warnings, "on the pages of the cases", _MOST_WARNINGS)
     return page
 
 

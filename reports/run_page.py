@@ -25,7 +25,7 @@ from reports.case_files import (
 )
 from reports.case_page import case_failures, scored_or_ok, version_of
 from reports.counts import scans
-from reports.doubts import assumed, copied_from_traces, doubted, said_by_cases, twins
+from reports.doubts import assumed, doubt_of
 from reports.figures import RunFiles, declared
 from reports.gates import gates_in
 from reports.origin import why_not_pooled
@@ -35,7 +35,7 @@ from reports.schema import FAILURES, OVERALL_FILE, SIMULATORS, SUMMARY, SWEEP
 from reports.sweep import not_run_sentence as not_swept_sentence
 from reports.sweep import silent_points
 from reports.tables import first_row, in_texts, read_if_there
-from reports.verdict import Doubt, badge, first_that_holds, of_these_alone, unscored, verdict
+from reports.verdict import badge, first_that_holds, of_these_alone, unscored, verdict
 from reports.what_next import next_command, typed, worst_frames
 from reports.worse import worse_cases, worse_sentence
 
@@ -51,7 +51,7 @@ def render_index(out_dir: Path, embed: bool = False, each: Each = one_by_one) ->
     runs = {path.name: read_json(path) for path in sorted(out_dir.glob("run*.json"))}
     infos, row = list(runs.values()), first_row(whole)
     uncounted = damaged | set(summary["case"][summary["role"] == "calibration"])
-    missing, doubts, gates, aside = not_run(out_dir), doubted(out_dir), gates_in(out_dir), _not_counted(out_dir)
+    missing, gates, aside = not_run(out_dir), gates_in(out_dir), _not_counted(out_dir)
     mixed, cases_said = why_not_pooled(out_dir), zip(summary["role"], summary["status"], strict=True)
     why_none = mixed or unscored(cases_said) or not_reached(out_dir)
     failed = not (cases and all(map(_of_another, failures)))
@@ -59,7 +59,7 @@ def render_index(out_dir: Path, embed: bool = False, each: Each = one_by_one) ->
     why["sweep incomplete"] = aside["not_swept"]
     page = {
         **_headline(cases, missing, damaged),
-        **_judged(cases, doubts, first_that_holds(why), row, why_none),
+        **_judged(out_dir, cases, first_that_holds(why), row, why_none),
         **_worse_cases(summary, links),
         "worst": worst_frames({n: t for n, t in files.errors.items() if n not in uncounted}, links),
         # of several shards' commands none is the one of the run
@@ -69,7 +69,6 @@ def render_index(out_dir: Path, embed: bool = False, each: Each = one_by_one) ->
         **aside,
         "gates": gates,
         "assumptions": assumed(out_dir),
-        "warnings": [*doubts, *said_by_cases({case.name: case.result for case in cases}, "warnings")],
         "numbers": _content.in_tiles(_content.overall(declared("overall"), whole)),
         # the first stands beside the tiles: not the map of hundreds of cases, which is taller than a screen
         "sections": sorted(draw_sections("run", files, out_dir, embed, each), key=_is_tall),
@@ -167,13 +166,12 @@ def _simulator(cases: Sequence[CaseFiles]) -> str:
 
 
 def _judged(
-    cases: Sequence[CaseFiles], doubts: Sequence[str], status: str, row: Mapping[str, Any], why_none: str
+    out_dir: Path, cases: Sequence[CaseFiles], status: str, row: Mapping[str, Any], why_none: str
 ) -> dict[str, Any]:
-    """Badge and verdict over all cases. row : of overall.csv.     why_none : why there may be no verdict."""
-    copied = copied_from_traces({case.name: case.result.get("warnings", ()) for case in cases})
-    doubt = Doubt(copied, twins(doubts))
-    said = " ".join(filter(None, (verdict(row, _simulator(cases), doubt), of_these_alone(row))))
-    return {"badge": badge(status, status == "ok", row, doubt), "verdict": said or why_none}
+    """Badge, verdict and warnings over all cases. row : of overall.csv.     why_none : why there may be no verdict."""
+    doubt = doubt_of(out_dir, {case.name: case.result for case in cases})
+    said = " ".join(filter(None, (verdict(row, _simulator(cases), doubt), of_these_alone(row)))) or why_none
+    return {"badge": badge(status, status == "ok", row, doubt), "verdict": said, "warnings": doubt.warnings}
 
 
 def _headline(cases: list[CaseFiles], missing: Sequence[str], damaged: Container[str]) -> dict[str, str]:

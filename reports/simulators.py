@@ -10,14 +10,14 @@ import pandas as pd
 from reports import _content
 from reports.alike import alike
 from reports.case_files import counted, listed, not_reached, not_run_sentence
-from reports.doubts import copied_from_traces, doubted, twins, warnings_in
+from reports.doubts import Doubt, copied_from_traces, doubted, twins, warnings_in
 from reports.figures.simulators import SimulatorFiles, leads
 from reports.gates import gates_in
 from reports.origin import why_not_pooled
 from reports.page import draw_sections, write_page
 from reports.schema import FAILURES, OURS, OVERALL_FILE, SIMULATORS, SUMMARY, WHERE, Column
 from reports.tables import first_row, in_texts, read_if_there
-from reports.verdict import NEVER_NEAREST, Doubt, badge, first_that_holds, tips_off, verdict
+from reports.verdict import NEVER_NEAREST, badge, first_that_holds, tips_off, verdict
 
 PAGE = "simulators.html"
 _MOST_WARNINGS, _MOST_REASONS = 5, 3

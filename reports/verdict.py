@@ -2,26 +2,14 @@
 
 from collections.abc import Iterable, Mapping
 from math import inf, isnan, nan
-from typing import Any, NamedTuple
+from typing import Any
 
 from reports._content import NOTHING, fewer_frames, interval, number, predictor_label
+from reports.case_files import counted
+from reports.doubts import NO_DOUBT, Doubt
 from reports.schema import OURS, SUMMARY
 
 _WIDE = "wide: "  # how the note on an interval over few insertions begins
-
-
-class Doubt(NamedTuple):
-    """Why the numbers may not mean what they say: a warning each, empty if there is none.
-
-    copied : the wires were made from the traces, so no number counts.     twins : some insertions look like one that
-    was scanned twice, but count as several.
-    """
-
-    copied: str = ""
-    twins: str = ""
-
-
-NO_DOUBT = Doubt()
 
 
 def verdict(statistics: Mapping[str, Any], simulator: str = "", doubt: Doubt = NO_DOUBT) -> str:
@@ -46,8 +34,18 @@ def verdict(statistics: Mapping[str, Any], simulator: str = "", doubt: Doubt = N
     sentence += f" From the true wire it lies {true} mm." * (true != NOTHING)
     sentence += _at_the_floor(statistics) + _beyond_inputs(statistics)
     again = f"But {TWINS} that was scanned again, and count as several: see the warnings." * bool(doubt.twins)
-    judged = tips_off(statistics), _against(statistics), _unknown_roll(statistics, simulator)
+    judged = _warned(doubt), tips_off(statistics), _against(statistics), _unknown_roll(statistics, simulator)
     return " ".join(filter(None, (sentence, *judged, again)))
+
+
+def _warned(doubt: Doubt) -> str:
+    """How many warnings stand below, and the first that speaks against an input: with a roll 25 degrees off a wire was
+    better than a guess, which was all that the first screen said.
+    """
+    if not doubt.against:
+        return f"{counted(len(doubt.warnings), 'warning')} below." * bool(doubt.warnings)
+    others = f"The weightiest of {len(doubt.warnings)} warnings" if len(doubt.warnings) > 1 else "A warning"
+    return f"{others}: {doubt.against}."
 
 
 FLOOR_SIGMAS = 1.4142
@@ -155,13 +153,18 @@ def first_that_holds(words: Mapping[str, Any]) -> str:
 def badge(status: str, good: bool, statistics: Mapping[str, Any], doubt: Doubt = NO_DOUBT) -> dict[str, str]:
     """The word beside a heading, and its look: good, poor (no better than a guess, though nothing failed) or bad.
 
-    statistics : a row of summary.csv or overall.csv, empty where nothing was scored.
+    statistics : a row of summary.csv or overall.csv, empty where nothing was scored. What is ok and has warnings says
+    how many, and is poor where one of them speaks against an input; its ``link`` leads to them.
     """
     if good and doubt.copied:
         return {"text": COPIED, "look": "bad"}
     poor = (TWINS if doubt.twins else standing(statistics)) if good else ""
     if poor == NOT_SHOWN and _skill(statistics)[1] > 0.0 and _few_insertions(statistics):
-        poor = TOO_FEW  # a wire of skill 0.97 and one of 0.34 had one badge, as if neither were any good
+        # wires of skill 0.97, 0.44 and 0.07 had one badge, as if none were any good
+        poor = f"skill {number(_skill(statistics)[1])}: {TOO_FEW}"
+    if good and not poor and doubt.warnings:
+        text = f"{status}, {counted(len(doubt.warnings), 'warning')}"
+        return {"text": text, "look": "poor" if doubt.against else "good", "link": "#warnings"}
     return {"text": poor or status, "look": "poor" if poor else "good" if good else "bad"}
 
 
@@ -247,7 +250,7 @@ _WEAKER = (
 def _few_insertions(statistics: Mapping[str, Any]) -> str:
     """Whose doing it is that an interval over few insertions is wide: not the wire's alone."""
     few = _over_few(statistics)
-    return f"Intervals over {few} are wide: a perfect wire may have such a one; scan more." * bool(few)
+    return f"Intervals over {few} are wide: a perfect wire may have such a one; scan six or more." * bool(few)
 
 
 def _over_few(statistics: Mapping[str, Any]) -> str:
@@ -257,9 +260,12 @@ def _over_few(statistics: Mapping[str, Any]) -> str:
 
 
 def of_these_alone(statistics: Mapping[str, Any]) -> str:
-    """That a skill without an interval is only about the insertions at hand: three of them are too few to say more."""
+    """That a skill without an interval is only about the insertions at hand: three give a wide one."""
     withheld = "withheld" in str(statistics.get("interval")) and _skill(statistics)[1] > 0.0
-    return "The skill is of these insertions alone: three at least would tell what others give." * withheld
+    alone = (
+        "The skill is of these insertions alone: three give an interval over what others would, six one not so wide."
+    )
+    return alone * withheld
 
 
 def _of_frames(statistics: Mapping[str, Any]) -> str:

@@ -9,7 +9,7 @@ import pandas as pd
 
 from reports._content import number
 from reports.case_files import WORST, counted, results_in
-from reports.doubts import doubted, said_by_cases
+from reports.doubts import doubted, said_by_cases, weightiest_first
 from reports.records import read_json
 
 _MANY = 5
@@ -36,7 +36,7 @@ def warned(out_dir: Path) -> list[str]:
 
     A text that several cases share is said once: on a screen of 30 lines the failures above should stay in sight.
     """
-    lines = [f"warning: {text}" for text in said_by_cases(results_in(out_dir), "warnings")]
+    lines = [f"warning: {text}" for text in weightiest_first(said_by_cases(results_in(out_dir), "warnings"))]
     rest = len(lines) - _MANY
     more = [f"{counted(rest, 'more warning')} on the pages of the cases"] * (rest > 0)
     return [*(f"warning: {text}" for text in doubted(out_dir)), *lines[:_MANY], *more]

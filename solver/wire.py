@@ -64,7 +64,7 @@ class GuideWire:
         """Check and tabulate the profiles."""
         number("wire", "segment_mm", self.segment_mm, Range(1e-3, 1e3, "1.0 is a good start"))
         number("wire", "radius_mm", self.radius_mm, Range(0.0, 1e3, "0.18 is a 0.014 inch wire"))
-        if not (isinstance(self.torsional_stiffness_N_mm2, float) and self.torsional_stiffness_N_mm2 == math.inf):
+        if not np.array_equal(self.torsional_stiffness_N_mm2, math.inf):  # of any kind of float
             number("wire", "torsional_stiffness_N_mm2", self.torsional_stiffness_N_mm2, STIFFNESS_N_MM2)
         number("wire", "weight_N_per_mm", self.weight_N_per_mm, Range(0.0, 1.0, "0.36 mm of steel weigh 8e-6"))
         bend = _table("bending_stiffness_N_mm2", self.bending_stiffness_N_mm2, self.segment_mm)

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from pipeline.load.geometry import unusable
 from pipeline.load.guard import opened, unpacked
@@ -185,15 +186,6 @@ def _of_quaternion(path: Path, fields: Any, pixdim: NDArray[Any]) -> NDArray[np.
     rest = 1.0 - (b * b + c * c + d * d)
     if not rest > -1e-3:
         raise unusable(path, f"the qform's quaternion {b:g}, {c:g}, {d:g} is longer than 1; correct the header")
-    a = np.sqrt(max(rest, 0.0))
-    scale = 1.0 / np.sqrt(a * a + b * b + c * c + d * d)
-    a, b, c, d = a * scale, b * scale, c * scale, d * scale
-    turn = np.array(
-        [
-            [a * a + b * b - c * c - d * d, 2 * (b * c - a * d), 2 * (b * d + a * c)],
-            [2 * (b * c + a * d), a * a + c * c - b * b - d * d, 2 * (c * d - a * b)],
-            [2 * (b * d - a * c), 2 * (c * d + a * b), a * a + d * d - b * b - c * c],
-        ]
-    )
+    turn = Rotation.from_quat([b, c, d, np.sqrt(max(rest, 0.0))]).as_matrix()
     flip = -1.0 if pixdim[0] < 0 else 1.0
     return np.column_stack([turn * (pixdim[1:4] * (1.0, 1.0, flip)), np.array(fields["qoffset"], float)])

@@ -12,7 +12,8 @@ from pipeline.load.outside import to_numbers, to_whole
 from pipeline.load.surfaces import split_cells, to_lps
 from pipeline.model import Array
 
-_TYPES = {"float": ">f4", "double": ">f8", "int": ">i4", "long": ">i8", "vtktypeint64": ">i8", "vtkIdType": ">i8"}
+# VTK writes its own indices, of 8 bytes in memory, as int
+_TYPES = {"float": ">f4", "double": ">f8", "int": ">i4", "long": ">i8", "vtktypeint64": ">i8", "vtkIdType": ">i4"}
 
 
 class _Legacy:

@@ -100,9 +100,11 @@ class Registration:
                 "allowed): the phantom is taken not to have moved; scan with less noise, or set trace.register = off"
             )
         if not self.trusted:
+            far = f"misfit {self.misfit_voxels:.1f} voxels, allowed {BAD_MISFIT_VOXELS}"
+            seen = far if np.isfinite(self.misfit_voxels) else "none is seen where the lumen has it"
             return (
-                f"no registration applied: the walls fit the reference in no place (misfit {self.misfit_voxels:.1f} "
-                f"voxels, allowed {BAD_MISFIT_VOXELS}); look at the frame, or set trace.register = off"
+                f"no registration applied: the walls fit the reference in no place ({seen}); look at the frame, or set "
+                "trace.register = off"
             )
         if not self.applied:
             return f"no registration applied: the phantom moved by {self.moved_voxels:.2f} voxel"

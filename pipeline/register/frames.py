@@ -10,6 +10,7 @@ from pipeline.model import Curve, Lumen, Volume
 from pipeline.register import Anchor, Registration, anchor, register
 from pipeline.register.bent import Bent
 from pipeline.register.rigid import Motion
+from reports.alike import in_words
 
 HIDES = (
     "the vessel's wall hardly shows a motion of the phantom along, or about, the vessel itself, as that of a straight "
@@ -86,8 +87,12 @@ def sentences_of(alignment: Alignment, found: Mapping[int, Registration | None])
         )
     if alignment.anchor.hides and known:
         texts.append(HIDES)
-    doubtful = [f"frame {n}: {r.sentence}" for n, r in known if not r.trusted or (r.applied and r.doubt)]
-    return texts, doubtful + _bent([(n, r.bent) for n, r in known if r.bent.told])
+    doubtful: dict[str, list[int]] = {}
+    for n, r in known:
+        if not r.trusted or (r.applied and r.doubt):
+            doubtful.setdefault(r.sentence, []).append(n)
+    told = [f"frame{'s' * (len(numbers) > 1)} {in_words(numbers)}: {text}" for text, numbers in doubtful.items()]
+    return texts, told + _bent([(n, r.bent) for n, r in known if r.bent.told])
 
 
 def _bent(found: Sequence[tuple[int, Bent]]) -> list[str]:

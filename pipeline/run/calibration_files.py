@@ -15,7 +15,7 @@ from pipeline.run.calibrated import data_of
 from pipeline.run.calibrated_wire import wire_rows
 from pipeline.run.calibration import Gathered, depth_offset
 from pipeline.run.provenance import code_state
-from pipeline.run.results import jsonable, write_json
+from pipeline.run.results import write_json
 from pipeline.study.parameters import Parameters, read_parameters
 from reports.atomic import write_text
 
@@ -213,7 +213,7 @@ def write_design(path: Path, wire: Wire, rows: list[Predicted], notes: tuple[str
         | {"what": u.what, "advice": "" if p.seen else _advice(u.name, wire)}
         for p in rows
     ]
-    write_json(path, jsonable({"schema": 1, "predicted": found, "notes": notes, "provenance": code_state()}))
+    write_json(path, {"schema": 1, "predicted": found, "notes": notes, "provenance": code_state()})
 
 
 def _used_by(found: Gathered) -> list[dict[str, Any]]:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from pipeline.arrays.polyline import at_arc, samples
 from pipeline.compare.metrics import point_to_curve, rms
@@ -98,10 +99,7 @@ def of_one_shape(one: Array, other: Array) -> bool:
     a, b = (points - points.mean(axis=0) for points in (_points(wire, reach) for wire in (one, other)))
     if min(np.linalg.svd(points, compute_uv=False)[1] / np.sqrt(len(points)) for points in (a, b)) < 0.5 * BENT_MM:
         return False
-    product = a.T @ b
-    strengths = np.linalg.svd(product, compute_uv=False)
-    strengths[2] *= np.sign(np.linalg.det(product))
-    return bool(np.sum(a**2) + np.sum(b**2) - 2.0 * np.sum(strengths) < len(a) * SAME_SHAPE_MM**2)
+    return bool(Rotation.align_vectors(a, b)[1] < np.sqrt(len(a)) * SAME_SHAPE_MM)
 
 
 def _points(wire: Array, reach_mm: float) -> Array:

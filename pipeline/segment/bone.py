@@ -10,7 +10,7 @@ from scipy import ndimage
 from skimage.filters import threshold_otsu
 
 from pipeline.arrays.grids import indices_of, spread
-from pipeline.segment.contact import Contact, counted, named
+from pipeline.segment.contact import Contact, how_many, named
 from pipeline.segment.levels import BRIGHTER, GreyLevels, Index, box_from, grey_around
 from solver.grid import Grid
 
@@ -56,7 +56,7 @@ def touching(scan: Grid, distance: Grid, corner: Index, levels: GreyLevels) -> t
     found = [Contact(distance.to_mm(first + place), count * face) for count, place in places]
     return (
         f"segment: something more than {BRIGHTER:g} times as bright as the vessel (bone, calcification, metal) touches "
-        f"its wall in {counted(places)}; largest at {named(found)}; there the wall may lie too far out: look at"
+        f"its wall in {how_many(places)}; largest at {named(found)}; there the wall may lie too far out: look at"
         " the picture, subtract the bone, or give the lumen as a file (manifest key lumen)",
     )
 

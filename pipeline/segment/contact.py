@@ -53,7 +53,7 @@ MOST_NAMED = 4
 """Places that a warning names; the largest."""
 
 
-def counted(places: Sequence[object]) -> str:
+def how_many(places: Sequence[object]) -> str:
     """Their number in words: 1 place, 2 places."""
     return f"{len(places)} place{'s' * (len(places) != 1)}"
 
@@ -69,7 +69,7 @@ def warning(places: tuple[Contact, ...]) -> tuple[str, ...]:
     if not places:
         return ()
     return (
-        f"segment: vessels that run side by side are open to each other in {counted(places)}, allowed 0; largest "
+        f"segment: vessels that run side by side are open to each other in {how_many(places)}, allowed 0; largest "
         f"at {named(places)}; a simulated wire may slip across there: look at the picture, scan with smaller voxels,"
         " or give the lumen as a file (manifest key lumen)",
     )

@@ -9,7 +9,7 @@ from scipy.ndimage import map_coordinates
 from pipeline.arrays.grids import in_memory_order, reorder
 from pipeline.model import Array, Curve, Lumen
 from pipeline.segment._kernels.solids import cones
-from pipeline.segment.contact import counted
+from pipeline.segment.contact import how_many
 from pipeline.segment.pieces import Gap, between_pieces, crossed, spelt
 from solver.grid import Grid, read_only
 
@@ -104,7 +104,7 @@ def _told(said: Sequence[Place], allowed: float) -> str:
     """The places as the begin of a sentence."""
     deepest, place = max(said, key=lambda one: one[0])
     return (
-        f"segment: traced wires ran up to {deepest:.2f} mm outside the lumen in {counted(said)}, allowed "
+        f"segment: traced wires ran up to {deepest:.2f} mm outside the lumen in {how_many(said)}, allowed "
         f"{allowed:.2f} and {SIGMAS:g} standard deviations; furthest at {spelt(place)} mm"
     )
 

@@ -5,9 +5,6 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
-import numpy as np
-from scipy import ndimage
-
 from pipeline.load import SUFFIXES, load, read_header
 from pipeline.load.common import on_common_box
 from pipeline.load.config import LoadConfig
@@ -17,6 +14,7 @@ from pipeline.load.guard import is_folder
 from pipeline.load.order import in_order
 from pipeline.load.slices import is_dicom, is_multiframe
 from pipeline.model import Array, Volume, Wall
+from pipeline.study.first_wire import NOWHERE, infer_entry, wire_voxels
 from pipeline.study.same_grid import apart
 from reports.case_files import listed
 
@@ -24,9 +22,6 @@ NO_REFERENCE = "reference: none found (a file named reference.*); --reference na
 REFERENCE_NAMES = ("reference", "ref", "wire_free", "nowire", "empty")
 DEFAULT_RADIUS_MM = 0.18
 PACKED = ".zip", ".7z", ".rar", ".tar", ".tgz", ".gz", ".bz2", ".xz"
-AT_EDGE = "the end of the wire nearest to the edge of the first frame"
-IN_PLACE = "the end of the wire in the first frame that is where it was in the last"
-NOWHERE = np.zeros((0, 3))
 UNSUBTRACTED = (
     "; without a reference to subtract the brightest thing there may be a filled vessel or a bone: such a guess is "
     "several mm off, look at the first frame and correct both, or scan the phantom without the wire"
@@ -152,50 +147,6 @@ def _named(path: Path, base: Path | None) -> str:
     return json.dumps((path.relative_to(base) if base and near else path.resolve()).as_posix(), ensure_ascii=False)
 
 
-def _wire_voxels(frame: Volume, reference: Volume | None) -> Array:
-    """Indices (n, 3) of the largest bright component: metal is brighter than anything else in a frame."""
-    grey = frame.values.astype(np.float32)
-    if reference is not None:
-        grey -= reference.values
-    peak = np.percentile(grey, 99.999)
-    labels, count = ndimage.label(grey > 0.5 * peak, np.ones((3, 3, 3)))
-    if count == 0:
-        return np.zeros((0, 3))
-    sizes = np.bincount(labels.ravel())[1:]
-    return np.argwhere(labels == 1 + int(sizes.argmax())).astype(float)
-
-
-def infer_entry(frame: Volume, reference: Volume | None, file: Path, last: Array = NOWHERE) -> tuple[Array, Array, str]:
-    """Entry (LPS mm), direction, and in words which end of the wire that is: where it begins, and points from there.
-
-    last : points (n, 3) of the wire in the last frame: its beginning stays in place. Where that does not tell the ends
-    apart, the one nearest to the edge of the scan. Raises LoadError, naming the frame's file, where no bright,
-    connected structure is found.
-    """
-    voxels = _wire_voxels(frame, reference)
-    if len(voxels) < 5:
-        why = "no wire is visible in it, the first frame, so the entry cannot be inferred"
-        do = "give --entry and --direction, or take the file out of the folder where it is no frame"
-        raise unusable(file, f"{why}; {do}")
-    points, reach = frame.to_mm(voxels), 4.0 * float(frame.spacing_mm.max()) + 2.0
-    edge = np.minimum(voxels, np.array(frame.shape) - 1 - voxels).min(axis=1)
-    entry, which = points[np.argmin(edge)], AT_EDGE
-    if len(last):
-        ends = _ends(points)
-        off = np.linalg.norm(ends[:, None] - _ends(last), axis=2).min(axis=1)
-        if off.min() < 0.5 * reach < off.max() - off.min():
-            entry, which = ends[np.argmin(off)], IN_PLACE
-    near = points[np.linalg.norm(points - entry, axis=1) < reach]
-    axis = np.linalg.svd(near - near.mean(axis=0))[2][0]
-    return entry, np.asarray(axis * np.sign((near.mean(axis=0) - entry) @ axis)), which
-
-
-def _ends(points: Array) -> Array:
-    """The two points (2, 3) of (n, 3) that lie farthest apart, as nearly as two looks find them."""
-    first = points[np.argmax(np.linalg.norm(points - points.mean(axis=0), axis=1))]
-    return np.stack([first, points[np.argmax(np.linalg.norm(points - first, axis=1))]])
-
-
 def _stated_or_seen(
     entry: Array | None, direction: Array | None, frames: Sequence[Path], reference: Path | None, config: LoadConfig
 ) -> tuple[Array, Array, str]:
@@ -217,7 +168,7 @@ def _stated_or_seen(
     empty, last = loaded(reference) if reference else None, NOWHERE
     if empty is not None and len(frames) > 1:
         final = loaded(frames[-1])
-        last = final.to_mm(_wire_voxels(final, empty))
+        last = final.to_mm(wire_voxels(final, empty))
     at, towards, which = infer_entry(loaded(frames[0]), empty, frames[0], last)
     guessed = " and ".join(name for name, of in (("entry_mm", entry), ("entry_direction", direction)) if of is None)
     where = f"{guessed}: {which}{'' if reference else UNSUBTRACTED}"

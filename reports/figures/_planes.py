@@ -29,7 +29,7 @@ _WAYS = (("left", "right"), ("back", "front"), ("head", "feet"))  # positive and
 _LABELS_INCH = 0.62  # what an axis title and its ticks take beside a panel
 _ROW_INCH = (1.5, 4.6)
 _MARGIN_MM = 5.0
-_EXACT = 0.9995  # cosine of 2 degrees
+_EXACT = 0.9995  # cosine of 1.8 degrees
 
 
 @dataclass(frozen=True, eq=False)

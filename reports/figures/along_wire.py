@@ -2,7 +2,7 @@
 
 import numpy as np
 import pandas as pd
-from matplotlib.colors import Normalize
+from matplotlib.colors import ListedColormap, Normalize
 from scipy.interpolate import interp1d
 
 from reports.case_files import CaseFiles
@@ -10,7 +10,7 @@ from reports.figures._drawing import Drawing, FrameAxis, error_scale, heat_map, 
 from reports.tables import has
 
 _MOST_OVER_U = 4.0  # twice what counts as beyond
-_NOT_SCORED = "0.88"
+_NOT_SCORED, _NO_FORCE = "0.82", "0.95"
 _CLIP_PERCENTILE = 99.5  # of forces, which have no scale of their own: one wild point must not turn the whole map dark
 
 
@@ -32,7 +32,7 @@ def contact_along_wire(case: CaseFiles) -> Drawing | None:
     points = case.points if has(case.points, "contact_force_N") else _joints(case)
     known = points["contact_force_N"].dropna()
     most = float(np.percentile(known, _CLIP_PERCENTILE)) if len(known) else 0.0
-    return _along_wire(points, "contact_force_N", "contact force, N", Normalize(0.0, max(most, 1e-9)))
+    return _along_wire(points, "contact_force_N", "contact force, N", Normalize(0.0, max(most, 1e-9)), zero=_NO_FORCE)
 
 
 def _joints(case: CaseFiles) -> pd.DataFrame:
@@ -49,7 +49,8 @@ def _joints(case: CaseFiles) -> pd.DataFrame:
     return pd.concat(parts, ignore_index=True) if len(parts) > 1 else case.points
 
 
-def _along_wire(points: pd.DataFrame, column: str, label: str, scale: Normalize) -> Drawing | None:
+def _along_wire(points: pd.DataFrame, column: str, label: str, scale: Normalize, zero: str = "") -> Drawing | None:
+    """The map of a column. zero : colour of what is exactly 0, where that is another thing than little."""
     kept = points[points[column].notna() & points["arc_mm"].notna()]
     if kept.empty:
         return None
@@ -65,7 +66,10 @@ def _along_wire(points: pd.DataFrame, column: str, label: str, scale: Normalize)
     figure = new_figure(float(np.clip(1.4 + 0.12 * len(frames), 2.9, 7.0)))
     axes = figure.subplots()
     edges = (np.arange(grid.shape[1] + 1) - 0.5) * step, np.append(frames, frames[-1] + 1) - 0.5
-    heat_map(axes, grid, edges, label, scale, bar={}, rasterized=True)
+    none = (grid == 0.0) & bool(zero)
+    heat_map(axes, np.where(none, np.nan, grid), edges, label, scale, bar={}, rasterized=True)
+    if none.any():
+        axes.pcolormesh(*edges, np.where(none, 0.0, np.nan), cmap=ListedColormap([zero]), rasterized=True)
     # the clamp's reach in front, which counts in no score: white is beyond the tip
     axes.barh(frames, held, height=1.0, color=_NOT_SCORED, linewidth=0.0)
     axes.set_xlim(left=0.0)

@@ -14,10 +14,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.optimize import minimize
 
 from pipeline.calibrate import segments
 from pipeline.calibrate.design import predicted, straight_to
-from pipeline.calibrate.estimates import Estimate, _judged, calibrated
+from pipeline.calibrate.estimates import Estimate, _followed, _judged, calibrated
 from pipeline.calibrate.fit import Problem
 from pipeline.calibrate.residuals import Evidence, weights_of
 from pipeline.calibrate.search import Fit, own_roll, roll_fitted
@@ -264,20 +265,45 @@ def test_a_wire_is_told_what_it_is_stated_without():
 def test_the_wire_is_told_along_its_length_with_its_deviation():
     """The page had factors alone: EI of the shaft, and that the tip's was held, had to be computed by hand."""
     free = {u.name: u for u in unknowns([], 0.0, weighed=True)}
-    linear = SimpleNamespace(covariance=np.diag([0.1, 0.3]) ** 2)
-    fit: Any = SimpleNamespace(values={TAPER: np.log(1.5), BENDING: 0.0})
-    fit.fit = SimpleNamespace(problem=SimpleNamespace(free=[free[TAPER]]), linear=linear)
+    found = [
+        SimpleNamespace(unknown=free[name], sd=sd, seen=name == TAPER)
+        for name, sd in ((TAPER, 0.1), (FRICTION, 0.07), (BENDING, 0.3))
+    ]
+    fit: Any = SimpleNamespace(values={TAPER: np.log(1.5), FRICTION: 0.0, BENDING: 0.0}, estimates=found)
+    fit.correlation = np.array([[1.0, -0.8, 0.0], [-0.8, 1.0, 0.0], [0.0, 0.0, 1.0]])
     rows = wire_rows(WIRE, fit, {"sd": 0.02, "seen": True})
     assert [row["at_mm"] for row in rows] == [0.0, 10.0, 30.0, 0.0, 8.0, 8.0]
     assert [row["used"] for row in rows] == pytest.approx([0.5, 0.5, 3.0, 0.1, 0.1, 0.0])
     assert [row["sd"] for row in rows] == pytest.approx([0.0, 0.0, 0.1, 0.02, 0.02, 0.0]), "the tip is held"
-    fit.fit.problem.free.append(free[BENDING])
+    found[2].seen = True
     weighed = wire_rows(replace(WIRE, bending_stiffness_N_mm2=2.0), fit, {"sd": 0.02, "seen": False})
     assert [row["sd"] for row in weighed] == pytest.approx([0.3, 0.0, 0.0, 0.0])
     assert weighed[0]["at_mm"] is None
     assert [row["sd"] for row in wire_rows(WIRE, fit, {"sd": 0.0, "seen": False})][2] == pytest.approx(
         np.hypot(0.1, 0.3)
     )
+
+
+def test_what_follows_in_a_profile_stays_within_its_bounds():
+    """They followed a friction below 0: a taper one standard deviation off was told as three."""
+    deviations = np.array([0.16, 0.07, 0.5])
+    together = np.array([[1.0, -0.8, 0.2], [-0.8, 1.0, 0.2], [0.2, 0.2, 1.0]])
+    normal = np.linalg.inv(together * np.outer(deviations, deviations))
+    root, low = np.linalg.cholesky(normal).T, np.array([-1.0, 0.0, -np.inf])
+    problem: Any = SimpleNamespace(
+        prior=(np.zeros(3), np.full(3, np.inf)), clipped=lambda x: np.maximum(x, low), value=lambda _, r: r[0] @ r[0]
+    )
+    linear: Any = SimpleNamespace(normal=normal, jacobian=[root])
+    for taper in (0.16, -0.16):
+        start = np.array([taper, 0.0, 3.0])
+        moved = _followed(problem, linear, 0, start, [-root @ start])
+
+        def value(others: Any, at: float = taper) -> float:
+            x = np.array([at, *others])
+            return float(x @ normal @ x)
+
+        best = minimize(value, [0.1, 0.0], bounds=[(0.0, None), (None, None)], tol=1e-12)
+        assert moved == pytest.approx([taper, *best.x], abs=1e-4)
 
 
 def test_derivatives_are_those_of_whole_insertions():

@@ -70,6 +70,17 @@ def test_a_legacy_file_that_is_whole_is_read(tmp_path: Path, after: str, binary:
     np.testing.assert_array_equal(read_vtk_points(path), POINTS)
 
 
+@pytest.mark.parametrize(("kind", "stored"), [("vtktypeint64", ">i8"), ("vtkIdType", ">i4")])
+def test_indices_of_a_binary_legacy_file_are_as_long_as_vtk_writes_them(tmp_path: Path, kind: str, stored: str) -> None:
+    """Those called vtkIdType were read as 8 bytes each; VTK has 8 in memory, and writes 4."""
+    path = tmp_path / "wire.vtk"
+    ends, corners = (np.array(values, stored).tobytes() for values in ([0, 6], range(6)))
+    head = HEAD.replace("ASCII", "BINARY").encode() + b"POINTS 6 double\n" + POINTS.astype(">f8").tobytes()
+    lines = f"\nLINES 2 6\nOFFSETS {kind}\n".encode() + ends + f"\nCONNECTIVITY {kind}\n".encode() + corners + b"\n"
+    path.write_bytes(head + lines)
+    np.testing.assert_array_equal(read_vtk_points(path), POINTS)
+
+
 def vtp(points: str, *, count: int = 6, form: str = "ascii", compressor: str = "") -> str:
     """A .vtp file of points alone."""
     data = f'<DataArray type="Float64" NumberOfComponents="3" format="{form}">{points}</DataArray>'

@@ -31,6 +31,7 @@ from pipeline.simulate.clamp import Clamp
 from pipeline.status import FrameStatus
 from pipeline.trace import DIM_FROM_TIP, FAINT_BEYOND, GOES_ON, of_catheter, of_length
 from pipeline.trace.config import TraceConfig
+from reports.doubts import Doubt
 
 
 def frames(lengths: list[float], expected: list[float]) -> list[Frame]:
@@ -73,6 +74,7 @@ def test_depths_counted_from_elsewhere_are_a_warning() -> None:
     """1.5 mm in every frame, within the tolerance of each: 16 of 18 ok, and nothing was said."""
     (said,) = elsewhere([d - 1.5 for d in DEPTHS], DEPTHS)
     assert said.startswith("the traced wires are 1.5 mm shorter than insertion_mm states (median of 6 frames)")
+    assert Doubt(warnings=[said]).against, "pages name it first"
     assert elsewhere([d - 0.4 for d in DEPTHS], DEPTHS) == []
     assert elsewhere([d - 1.5 for d in DEPTHS[:3]], DEPTHS[:3]) == []
     assert elsewhere(DEPTHS, [float("nan")] * 6) == []

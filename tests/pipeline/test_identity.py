@@ -20,7 +20,8 @@ from pipeline.load.order import in_order
 from pipeline.model import Volume
 from pipeline.run.hashing import file_hash
 from pipeline.run.store import digest
-from pipeline.study.infer import AT_EDGE, IN_PLACE, _deeper, _order, _scans_in, infer_entry, infer_manifest
+from pipeline.study.first_wire import AT_EDGE, IN_PLACE, MOVED_IN, infer_entry
+from pipeline.study.infer import _deeper, _order, _scans_in, infer_manifest
 from pipeline.study.manifest import ManifestError, read_manifest
 from tests.pipeline.test_load import SPACING, image_of, numbered
 from tests.pipeline.test_manifest import GOOD
@@ -288,6 +289,20 @@ def test_the_wire_begins_where_it_stays_in_place() -> None:
     assert direction[2] > 0.9
     for told in (np.zeros((0, 3)), first.to_mm(np.argwhere(first.values > 0))):  # one frame, or all of one depth
         assert infer_entry(first, None, Path("f.mha"), told)[2] == AT_EDGE
+
+
+@pytest.mark.parametrize(("medium", "begins"), [(1000.0, 12.0), (0.0, 1.0)])
+def test_an_entry_lies_in_the_vessel_that_the_reference_shows(medium: float, begins: float) -> None:
+    """It lay in the vessel's end, where the wire comes out of its introducer: the first run was segment_failed."""
+    values = np.random.default_rng(0).normal(0.0, 50.0, (40, 20, 20)).astype(np.float32)
+    values[12:, 7:13, 7:13] += medium  # from 12 mm on; an unfilled phantom tells nothing
+    wire = np.zeros_like(values)
+    wire[1:30, 10, 10] = 5000.0
+    reference, frame = Volume(values, np.ones(3), np.zeros(3)), Volume(values + wire, np.ones(3), np.zeros(3))
+    entry, direction, which = infer_entry(frame, reference, Path("f.mha"))
+    np.testing.assert_allclose(entry, [begins, 10.0, 10.0], rtol=0.0, atol=1.0)  # a voxel
+    assert which == AT_EDGE + MOVED_IN * (medium > 0)
+    assert direction[0] > 0.99
 
 
 @pytest.mark.parametrize(("size", "origin_mm", "said"), [(12, 0.3, "the shapes differ"), (16, 1.0, "voxels apart")])

@@ -118,6 +118,15 @@ def test_another_phantom_is_not_forced_into_place(study: Study, fixed: Anchor) -
     assert "the walls fit the reference in no place" in found.sentence
 
 
+def test_frames_that_fit_nowhere_are_one_warning(fixed: Anchor, lumen: Lumen) -> None:
+    """Of a lumen with diameters for radii seven said "misfit inf voxels", and hid one that said what was wrong."""
+    alignment = alignment_of(lumen, fixed.reference, SKIP, switched_on=True, own_curves=False)
+    (told,) = sentences_of(alignment, {n: Registration(misfit_voxels=np.inf) for n in (0, 1, 2, 5)})[1]
+    assert told.startswith(
+        "frames 0 to 2, 5: no registration applied: the walls fit the reference in no place (none is"
+    )
+
+
 @pytest.mark.parametrize("sd", [200.0, 400.0])
 def test_what_noise_makes_of_a_misfit_is_known(study: Study, lumen: Lumen, sd: float) -> None:
     """The scanner's own noise, correlated over half a voxel, is 100: it counts for a little less than white noise."""

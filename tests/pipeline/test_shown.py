@@ -10,7 +10,11 @@ from scipy.spatial import cKDTree
 from scipy.special import ndtr
 
 from pipeline.model import Lumen, Volume
-from pipeline.segment.shown import beside_the_wall
+from pipeline.run.stages.known import Frame
+from pipeline.run.stages.trace import _first_said
+from pipeline.segment.shown import Doubt, beside_the_wall
+from pipeline.status import FrameStatus
+from reports.doubts import Doubt as Warned
 from solver import Grid
 from tests.pipeline.phantoms import helix
 
@@ -43,13 +47,15 @@ def larger(tube: Grid, by_mm: float) -> Lumen:
 
 @pytest.mark.parametrize("by_mm", [-0.1, 0.0, 0.1])
 def test_a_lumen_that_fits_is_nothing_to_speak_of(tube: Grid, by_mm: float) -> None:
-    assert beside_the_wall(larger(tube, by_mm), scan_of(tube)) == []
+    assert beside_the_wall(larger(tube, by_mm), scan_of(tube)) == Doubt()
 
 
 @pytest.mark.parametrize("by_mm", [0.4, 1.0, 1.1, -0.4, -0.8])
 def test_a_lumen_of_another_size_is_told_by_how_much(tube: Grid, by_mm: float) -> None:
     """A mask dilated by one voxel multiplied the error by 3.5, and nothing was said."""
-    (told,) = beside_the_wall(larger(tube, by_mm), scan_of(tube))
+    told, far = beside_the_wall(larger(tube, by_mm), scan_of(tube))
+    assert Warned(warnings=[told]).against, "pages name it first"
+    assert far is (abs(by_mm) > 2.0 * VOXEL)
     assert ("outside the wall" if by_mm > 0 else "inside the wall") in told
     found = float(told.partition("lies ")[2].partition(" mm")[0])
     assert found == pytest.approx(abs(by_mm), abs=0.15 * VOXEL)
@@ -57,13 +63,24 @@ def test_a_lumen_of_another_size_is_told_by_how_much(tube: Grid, by_mm: float) -
 
 def test_a_lumen_elsewhere_is_told_where(tube: Grid) -> None:
     lumen = Lumen(replace(tube, origin_mm=tube.origin_mm + [0.0, 0.6, -0.3]))
-    (told,) = beside_the_wall(lumen, scan_of(tube))
+    told, _ = beside_the_wall(lumen, scan_of(tube))
     found = np.array([float(x) for x in told.partition("(")[2].partition(")")[0].split(",")])
     np.testing.assert_allclose(found, [0.0, 0.6, -0.3], rtol=0.0, atol=0.04)  # a tenth of a voxel
 
 
+def test_a_frame_that_failed_in_a_lumen_far_off_says_that_first() -> None:
+    """Diameters given for radii: "look at the reference; name another one, or none" stood above what was wrong."""
+    bad = Frame(0).failed("trace", FrameStatus.TRACE_AMBIGUOUS, "trace: wire: got two")
+    assert (
+        _first_said(bad, "the lumen lies off").message == "the lumen lies off; look at that first. trace: wire: got two"
+    )
+    assert _first_said(bad, "").message == "trace: wire: got two"
+    good = Frame(0)
+    assert _first_said(good, "the lumen lies off") is good
+
+
 def test_a_scan_without_the_vessel_says_nothing(tube: Grid) -> None:
     """Taken without contrast medium: the user's lumen is all there is."""
-    assert beside_the_wall(larger(tube, 1.0), scan_of(tube, contrast=100.0)) == []
+    assert beside_the_wall(larger(tube, 1.0), scan_of(tube, contrast=100.0)) == Doubt()
     away = scan_of(tube)
-    assert beside_the_wall(larger(tube, 1.0), replace(away, origin_mm=away.origin_mm + 500.0)) == []
+    assert beside_the_wall(larger(tube, 1.0), replace(away, origin_mm=away.origin_mm + 500.0)) == Doubt()

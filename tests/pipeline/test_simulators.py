@@ -18,11 +18,11 @@ from pipeline.run.stages import others
 from pipeline.run.stages.known import Known
 from reports import tables
 from reports.case_page import render_case
-from reports.doubts import AMONG, COUNT_AS, MADE_FROM_TRACES
+from reports.doubts import AMONG, COUNT_AS, MADE_FROM_TRACES, Doubt
 from reports.run_page import render_index
 from reports.schema import ERRORS, FAILURES, POINTS, SIMULATORS, SUMMARY, WHERE
 from reports.simulators import _where, in_common, nearer, render_simulators
-from reports.verdict import Doubt, verdict
+from reports.verdict import verdict
 
 pytestmark = pytest.mark.usefixtures("invented")
 Array = NDArray[np.float64]

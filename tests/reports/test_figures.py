@@ -177,6 +177,20 @@ def test_the_caption_says_where_colours_of_forces_end() -> None:
     assert f"{_CLIP_PERCENTILE:g}th percentile" in entry["read"]
 
 
+def test_no_force_is_another_colour_than_a_little_one(tmp_path: Path) -> None:
+    """Both were pale violet: a wire that lies free looked as if it touched all along."""
+    case = _heat_case(tmp_path)
+    assert case.samples is not None
+    size = np.where(case.samples["arc_mm"] < 2.0, 0.0, 1e-4)
+    drawing = CASE_FIGURES["contact_along_wire"](replace(case, samples=case.samples.assign(contact_force_N=size)))
+    assert drawing is not None
+    forces, none = (np.ma.masked_invalid(mesh.get_array()) for mesh in drawing.figure.axes[0].collections)
+    assert forces.min() > 0.0
+    assert none.count() > 0
+    assert not (~np.ma.getmaskarray(forces) & ~np.ma.getmaskarray(none)).any()
+    assert none.count() + forces.count() == len(drawing.table)
+
+
 def test_heat_map_shows_each_sample_at_its_place(tmp_path: Path) -> None:
     drawing = CASE_FIGURES["error_along_wire"](_heat_case(tmp_path))
     assert drawing is not None

@@ -7,6 +7,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from reports.doubts import Doubt, weightiest_first
 from reports.verdict import badge, in_short, of_these_alone, unscored, verdict
 from reports.what_next import next_command, typed, warned, worst_frames
 from reports.worse import worse_sentence
@@ -119,10 +120,11 @@ def test_no_green_badge_beside_a_negative_skill(skill: float | None, low: float 
 
 
 def test_a_wide_interval_of_few_insertions_is_no_fault_of_the_wire() -> None:
-    """Over three insertions skills of 0.97 and 0.34 had one badge, not shown to be better than a guess."""
+    """Over three insertions skills of 0.97, 0.44 and 0.07 had one badge, and a better wire no other than a worse."""
     row = {"skill_strongest": 0.97, "skill_strongest_low": -0.1, "strongest_null": "previous"}
     told = row | {"interval": "wide: 3 insertions"}
-    assert badge("ok", True, told) == {"text": "too few insertions to tell from a guess", "look": "poor"}
+    assert badge("ok", True, told) == {"text": "skill 0.970: too few insertions to tell from a guess", "look": "poor"}
+    assert badge("ok", True, told | {"skill_strongest": 0.07})["text"].startswith("skill 0.0700: too few insertions")
     assert badge("ok", True, told | {"skill_strongest": -0.1})["text"] == "no better than a guess"
     assert badge("ok", True, row)["text"] == "not shown to be better than a guess"
 
@@ -179,6 +181,36 @@ def test_the_verdict_says_of_how_many_planned_frames_it_speaks() -> None:
     assert "The wire is better (skill 0.900) than" in verdict(row | {"frames_ok": 12})
     assert "weaker without the others" in verdict(row)
     assert "planned" not in verdict(row | {"frames_ok": 12})
+
+
+ROLLED = "turned by -30 degrees, the simulated wire lies 0.10 mm (rms) from the traced one, as stated 0.36 mm: check"
+
+
+@pytest.mark.parametrize(
+    ("warnings", "text", "look", "said"),
+    [
+        ((), "ok", "good", ""),
+        (("few points",), "ok, 1 warning", "good", "1 warning below."),
+        (("few points", ROLLED), "ok, 2 warnings", "poor", f"The weightiest of 2 warnings: {ROLLED}."),
+        ((ROLLED,), "ok, 1 warning", "poor", f"A warning: {ROLLED}."),
+    ],
+)
+def test_warnings_stand_before_the_word_better(warnings: tuple[str, ...], text: str, look: str, said: str) -> None:
+    """A roll 25 degrees off was a green ok and "The wire is better"; that it is wrong stood below the figure."""
+    row = {"rms_mm": 0.36, "skill_strongest": 0.8, "strongest_null": "centreline"}
+    doubt = Doubt(warnings=warnings)
+    found = badge("ok", True, row, doubt)
+    assert (found["text"], found["look"]) == (text, look)
+    assert (found.get("link") == "#warnings") is bool(warnings)
+    assert badge("no_wire", False, row, doubt) == {"text": "no_wire", "look": "bad"}
+    whole = verdict(row, doubt=doubt)
+    assert f"{said} The wire is better".strip() in whole
+    assert ("arning" in whole) is bool(warnings)
+
+
+def test_a_warning_against_an_input_is_none_of_the_last() -> None:
+    """The terminal and a page show five: behind these a wrong roll was one of "3 more warnings"."""
+    assert weightiest_first(["a", "b", ROLLED, "c"]) == [ROLLED, "a", "b", "c"]
 
 
 def test_a_wrong_roll_is_guessed_at() -> None:

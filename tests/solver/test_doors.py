@@ -302,6 +302,12 @@ def test_the_ends_of_a_range_lie_within_it() -> None:
             doors.number("wall", "k", beyond, allowed)
 
 
+@pytest.mark.parametrize("kind", [float, np.float32, np.float64, np.array])
+def test_ideal_torque_control_may_be_of_any_kind_of_float(kind: Any) -> None:
+    """numpy.float32(inf) was refused with "got inf", which is the default."""
+    assert not wire(torsional_stiffness_N_mm2=kind(np.inf)).twists
+
+
 def test_two_voxels_along_each_axis_are_enough_for_a_wall() -> None:
     """One is not."""
     x = np.mgrid[0:2, 0:2, 0:2][0].astype(float) - 0.25

@@ -129,6 +129,18 @@ def test_wires_in_lanes_have_the_wall_at_their_entry_as_well() -> None:
     assert together[0].push_force_N == pytest.approx(alone.push_force_N, abs=1e-6)
 
 
+@pytest.mark.parametrize("load_N", [(0.01, 0.0, 0.0), (-0.02, 0.0, 0.0), (0.0, 0.01, -0.004)])
+def test_the_push_of_a_preshaped_wire_is_what_the_manual_says(load_N: tuple[float, float, float]) -> None:
+    """The manual took the bending energy per length off, M^2/2EI alone: 0.002 N instead of 0.010."""
+    stiffness, curvature = 0.6, 0.15
+    wire = GuideWire(0.02, 0.18, stiffness, curvature)
+    insertion = Insertion(wire, None, [0, 0, 0], [0, 0, 1], material_axis=[1, 0, 0], tip_load_N=load_N, step_mm=1.0)
+    (bent,) = insertion.to_depths([8.0])
+    moment = np.cross(bent.joints_mm[-1], load_N)
+    less = moment[:2] @ moment[:2] / (2.0 * stiffness) + moment[1] * curvature
+    assert bent.reaction_force_N[2] - bent.push_force_N == pytest.approx(less, abs=1e-6)
+
+
 def test_frames_follow_a_roll_that_moves_nothing() -> None:
     """Of a straight wire without friction that is only rolled, they kept the roll before."""
     insertion = Insertion(GuideWire(1.0, 0.2, 5.0), None, [0, 0, 0], [0, 0, 1.0], material_axis=[1.0, 0, 0])

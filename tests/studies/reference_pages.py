@@ -8,6 +8,7 @@ import inspect
 import json
 import math
 from collections.abc import Callable, Iterable, Sequence
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +27,7 @@ from solver import Status
 from tests.studies import metrics_page
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
+PROPERTIES = property, cached_property
 NOTE = "*Written by `make pages` from the code; do not edit.*\n"
 KEYS = {
     "id": "Name of the case and of its folder in OUT.",
@@ -296,13 +298,13 @@ def public(thing: Any) -> list[tuple[str, Any]]:
     if not inspect.isclass(thing) or issubclass(thing, Exception):
         return []
     members = [(key, value) for key, value in vars(thing).items() if not key.startswith("_") or key == "__init__"]
-    kept = (inspect.isfunction, lambda value: isinstance(value, property))
+    kept = (inspect.isfunction, lambda value: isinstance(value, PROPERTIES))
     found = [(key, value) for key, value in members if any(kind(value) for kind in kept) and inspect.getdoc(value)]
     return [pair for pair in found if pair[0] != "__init__" or pair[1].__doc__]
 
 
 def member(owner: str, name: str, value: Any) -> str:
-    call = f"{owner}.{name}" if isinstance(value, property) else f"{owner}.{name}{signature(value)}"
+    call = f"{owner}.{name}" if isinstance(value, PROPERTIES) else f"{owner}.{name}{signature(value)}"
     call = call.replace(f"{owner}.__init__", owner)
     return f"```text\n{call}\n\n{inspect.getdoc(value)}\n```\n"
 

@@ -132,6 +132,7 @@ Result = TypeVar("Result", Lumen, Curve)
 class Known:
     """What is known of a case so far.
 
+    lumen_doubt : what the scan says against a given lumen that is far off; empty where it is not.
     clamp, segment_mm : what was simulated with.     clues : see ``clues_of``.
     sources, entries : rows of budget.csv and entries.csv.
     ends_rank : of the real insertion in the budget's ensemble (see ``budget.joint``).
@@ -140,6 +141,7 @@ class Known:
 
     scans: Scans | None = None
     lumen: Lumen | None = None
+    lumen_doubt: str = ""
     clamp: Clamp | None = None
     clues: Clues | None = None
     segment_mm: float = float("nan")

@@ -20,7 +20,7 @@ from pipeline.segment.hollows import hollows
 from pipeline.segment.levels import failed
 from pipeline.segment.opened import outside_mm
 from pipeline.segment.pieces import in_pieces
-from pipeline.segment.shown import beside_the_wall
+from pipeline.segment.shown import Doubt, beside_the_wall
 from pipeline.status import StageError
 from pipeline.trace.warm import warm_up
 from reports.frames_file import ScanCrop
@@ -35,8 +35,9 @@ def segment_vessel(run: Context, known: Known) -> Known:
         _require_entry(run, lumen)
         log.assumptions += lumen.warnings
         log.warnings += in_pieces(lumen.distance, case.entry_mm) + hollows(lumen.distance)
-        log.warnings += _held_against(run, known, lumen)
-        return replace(known, lumen=lumen)
+        doubt = _held_against(run, known, lumen)
+        log.warnings += [doubt.told] * bool(doubt.told)
+        return replace(known, lumen=lumen, lumen_doubt=doubt.told * doubt.far)
     assert known.scans is not None
     scan = known.scans.first
     assert scan is not None, "the manifest guarantees frames, a reference or a lumen"
@@ -106,15 +107,15 @@ def _box_of(lumen: Lumen) -> tuple[Array, Array]:
     return inside.min(axis=0), inside.max(axis=0)
 
 
-def _held_against(run: Context, known: Known, lumen: Lumen) -> list[str]:
+def _held_against(run: Context, known: Known, lumen: Lumen) -> Doubt:
     """What the case's first scan, if it has one, says of the user's own lumen."""
     scan = None if known.scans is None else known.scans.first
     if scan is None:
-        return []
+        return Doubt()
     try:
         shown = run.load(Crop(scan, scan.box_of(corners_mm(lumen.distance)), run.config.load))
     except StageError:  # said where it is read to be traced
-        return []
+        return Doubt()
     with run.log.timed("segment"):
         return beside_the_wall(lumen, shown)
 

@@ -84,6 +84,7 @@ def trace_frames(run: Context, known: Known) -> Known:
     assumed, doubtful = sentences_of(work.alignment, {frame.index: frame.registration for frame in frames})
     run.log.assumptions += assumed
     run.log.warnings += doubtful + of_drift({f.index: f.curve for f in frames if f.curve is not None})
+    frames = [_first_said(frame, known.lumen_doubt) for frame in frames]
     return _with_room(run, known, frames, elsewhere(frames, seen, run.config.trace, voxel_mm))
 
 
@@ -103,6 +104,13 @@ def _in_step(run: Context, frames: list[Frame], voxel_mm: float) -> list[Frame]:
         own = {index: curve.points_mm for index, curve in trusted(frames).items()}
         run.log.warnings += rough(own, voxel_mm, "the manifest's own curves", RESAMPLE)
     return frames
+
+
+def _first_said(frame: Frame, lumen_doubt: str) -> Frame:
+    """The frame; one that failed in a lumen that is far off says so first: the reference was blamed, or the wire."""
+    if frame.ok or not lumen_doubt:
+        return frame
+    return replace(frame, message=f"{lumen_doubt}; look at that first. {frame.message}")
 
 
 def _with_room(run: Context, known: Known, frames: list[Frame], doubted: Collection[int] = ()) -> Known:
