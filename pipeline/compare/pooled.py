@@ -64,6 +64,7 @@ def pooled(frames: Sequence[Scored]) -> dict[str, Any]:
         elif column.pooled in POOLING:
             values = numbers(frames, column.name)
             result[column.pooled_name] = _over_frames(POOLING[column.pooled], values, points)
+    result["tip_max_mm"] = _over_frames(POOLING["max"], numbers(frames, "tip_mm"), points)
     # by Pythagoras: one offset common to all frames is taken off, the part of the error along the wire that it explains
     left = result["arc_rms_mm"] ** 2 - result["depth_offset_mm"] ** 2
     result["arc_offset_rms_mm"] = float(np.sqrt(max(left, 0.0))) if np.isfinite(left) else float("nan")
