@@ -4,7 +4,6 @@ What a file's numbers mean is stated, by the file, its format or whoever names i
 or RAS that is taken for mm and LPS is another wire. A frame without a usable wire is known as such and by its reason.
 """
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,6 +15,7 @@ from pipeline.load.curves import READERS, distinct, points_in_table
 from pipeline.load.geometry import LoadError, Source, refused, unusable
 from pipeline.load.guard import size_of
 from pipeline.load.hdf5 import require_written
+from pipeline.load.order import last_counts
 from pipeline.load.outside import to_whole
 from pipeline.load.stated import stated_in, stated_in_table
 from pipeline.load.surfaces import RAS_TO_LPS
@@ -74,11 +74,14 @@ def read_wires(files: Sequence[Source], count: int, space: str = "", unit: str =
 
 
 def numbered_frames(paths: Sequence[Path], count: int) -> dict[int, Path]:
-    """Files by frame: by the last number in their names, counted from 0 or 1, else in the order given."""
-    found = [re.findall(r"\d+", path.name.lower().removesuffix(kind_of(path))) for path in paths]
-    numbers = [int(digits[-1]) if digits else -1 for digits in found]
+    """Files by frame: by the last number in their names, counted from 0 or 1, else in the order given.
+
+    Names of depths are in order, but which one is missing they do not tell.
+    """
+    found = last_counts([path.name.lower().removesuffix(kind_of(path)) for path in paths])
+    numbers = [number for number in found if number is not None]
     unique = set(numbers)
-    if len(unique) == len(numbers) and -1 not in unique and paths:
+    if len(unique) == len(paths) and paths:
         first = 1 if 0 not in unique and count in unique else 0
         if (0 in unique or count in unique) and unique <= set(range(first, first + count)):
             return {number - first: path for number, path in zip(numbers, paths, strict=True)}
@@ -91,7 +94,8 @@ def numbered_frames(paths: Sequence[Path], count: int) -> dict[int, Path]:
         raise unusable(paths[0].parent, f"{why} frame's wire; {do} (/frames/NNN/simulated_mm)")
     shown = f"{len(paths)} files, {paths[0].name} to {paths[-1].name}, for {count} frames"
     do = f"number them from 0 to {count - 1}; an empty file stands for a frame that the simulator failed in"
-    raise unusable(paths[0].parent, f"got {shown}: it is not known which belongs to which; {do}")
+    unnumbered = " (a decimal, as of a depth, is no number of a frame)" * (None in found)
+    raise unusable(paths[0].parent, f"got {shown}: it is not known which belongs to which{unnumbered}; {do}")
 
 
 def _in_hdf5(path: Path, count: int, space: str, unit: str) -> list[OtherFile]:
