@@ -11,12 +11,13 @@ from pathlib import Path
 import h5py
 import numpy as np
 
+from pipeline.arrays.polyline import UNITS_MM
 from pipeline.load.curves import READERS, distinct, points_in_table
 from pipeline.load.geometry import LoadError, Source, refused, unusable
 from pipeline.load.guard import size_of
 from pipeline.load.hdf5 import require_written
 from pipeline.load.order import last_counts
-from pipeline.load.outside import to_whole
+from pipeline.load.outside import millimetres, to_whole
 from pipeline.load.stated import stated_in, stated_in_table
 from pipeline.load.surfaces import RAS_TO_LPS
 from pipeline.load.tables import rows_of
@@ -26,7 +27,6 @@ from pipeline.model import Array
 OF_KIND = {**READERS, ".vtk": read_vtk_points}
 IN_HDF5 = (".h5", ".hdf5")
 KINDS = (".csv", *OF_KIND, *IN_HDF5)
-UNITS_MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0}
 USUAL = {"space": "LPS", "unit": "mm"}
 """What is stated of coordinates, in the order of ``stated_in``, and what most have."""
 
@@ -153,7 +153,7 @@ def _read(path: Path, space: str, unit: str) -> OtherFile:
         return OtherFile(path.name, problem=str(error).removeprefix(f"{path}: "), unclear=True)
     # all readers but that of tables convert a file that states RAS by themselves
     turned = in_space == "RAS" and (table is not None or not own[0])
-    factor = 1.0 if kind == ".mrk.json" else UNITS_MM[in_unit]  # the reader of .mrk.json converts units itself
+    factor = 1.0 if kind == ".mrk.json" else millimetres(path, in_unit)  # the reader of .mrk.json converts units itself
     return replace(_checked(path.name, points * factor * (RAS_TO_LPS if turned else 1.0)), unit=in_unit)
 
 
@@ -161,13 +161,13 @@ def _agreed(path: Path, by_file: tuple[str, str], by_caller: tuple[str, str]) ->
     """Space and unit of a file, as it or the caller states them; LoadError where neither does, or they differ."""
     own, given = (dict(zip(USUAL, stated, strict=True)) for stated in (by_file, by_caller))
     for what in USUAL:
-        if own[what] and given[what] and own[what] != given[what]:
+        said, typed = (UNITS_MM.get(value, value) for value in (own[what], given[what]))
+        if said and typed and said != typed:
             raise unusable(path, f"{what}: the file says {own[what]}, stated was {given[what]}; correct one of them")
     agreed = {what: own[what] or given[what] for what in USUAL}
     if missing := [what for what in USUAL if not agreed[what]]:
         raise unusable(path, _unstated(missing, kind_of(path)))
-    if agreed["unit"] not in UNITS_MM:
-        raise unusable(path, f"unit {agreed['unit']!r}; allowed: {', '.join(UNITS_MM)}")
+    millimetres(path, agreed["unit"])
     return agreed["space"], agreed["unit"]
 
 

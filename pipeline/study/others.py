@@ -21,7 +21,7 @@ class Others(Strict):
 
     files: Sources = ()
     space: Literal["", "LPS", "RAS"] = ""
-    unit: Literal["", "mm", "cm", "m"] = ""
+    unit: Literal["", "mm", "um", "cm", "m", "inch"] = ""
 
 
 def written_out(value: Any) -> Any:

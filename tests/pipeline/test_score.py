@@ -474,7 +474,7 @@ def test_what_is_wrong_with_all_is_refused(known: Known, tmp_path: Path, capsys:
         ("bare", write_csv(tmp_path / "bare", wires, "x,y,z"), "space and unit are not stated"),
         ("cm", write_csv(tmp_path / "cm", wires, "# unit: cm\nx,y,z"), "space is not stated and will not be guessed"),
         ("unit", write_csv(tmp_path / "unit", wires, "# space: LPS\nx,y,z"), "unit is not stated"),
-        ("feet", write_csv(tmp_path / "feet", wires, "# space: LPS\n# unit: ft\nx,y,z"), "unit 'ft'"),
+        ("feet", write_csv(tmp_path / "feet", wires, "# space: LPS\n# unit: ft\nx,y,z"), "lengths in 'ft'"),
         ("five", write_csv(tmp_path / "five", [*wires, wires[-1]]), "5 files, wire_000.csv to wire_004.csv, for 4"),
         ("late", write_csv(tmp_path / "late", wires[1:3], first=1), "not known which belongs to which"),
         ("turned", write_csv(tmp_path / "turned", [w[::-1] for w in wires]), "tip first"),
@@ -506,8 +506,10 @@ def test_every_format_and_what_it_states(tmp_path: Path) -> None:
         for n, w in enumerate(wires):
             file[f"frames/{n:03d}/simulated_mm"] = w
     write_csv(tmp_path / "ras", [w * [-1e-3, -1e-3, 1e-3] for w in wires], "# space: RAS\n# unit: m\nx,y,z")
+    write_csv(tmp_path / "inch", [w / 25.4 for w in wires], "# space: LPS\n# unit: inch\nx,y,z")
+    write_csv(tmp_path / "micron", [w * 1e3 for w in wires], "# space: LPS\n# unit: micron\nx,y,z")
     write_csv(tmp_path / "waiting", [np.concatenate([w[:1], w[:1], w]) for w in wires], first=1)
-    for place in ("vtp", "mrk", "vtk", "all.h5", "ras", "waiting"):
+    for place in ("vtp", "mrk", "vtk", "all.h5", "ras", "inch", "micron", "waiting"):
         path = tmp_path / place
         files = [Source(p) for p in ([path] if path.is_file() else sorted(path.iterdir()))]
         for found, wire in zip(read_wires(files, 2), wires, strict=True):
