@@ -23,6 +23,8 @@ from pipeline.load.surfaces import RAS_TO_LPS
 from pipeline.load.tables import rows_of
 from pipeline.load.vtk import read_vtk_points
 from pipeline.model import Array
+from reports import records
+from reports.texts import UnreadableError
 
 OF_KIND = {**READERS, ".vtk": read_vtk_points}
 IN_HDF5 = (".h5", ".hdf5")
@@ -37,6 +39,7 @@ class OtherFile:
 
     missing : the simulator wrote nothing for the frame.     unclear : nobody says what its numbers mean, or two say
     different things.     where : the file with its folder, empty where there is none.     unit : stated of its numbers.
+    refused : status, sentence and message of a wire that its own run refused.
     """
 
     name: str
@@ -46,6 +49,7 @@ class OtherFile:
     unclear: bool = False
     where: str = ""
     unit: str = "mm"
+    refused: tuple[str, ...] = ("", "", "")
 
 
 def kind_of(path: Path) -> str:
@@ -114,8 +118,22 @@ def _in_hdf5(path: Path, count: int, space: str, unit: str) -> list[OtherFile]:
     if beyond:
         raise unusable(path, f"got frame {beyond[0]} for {count} frames; number them from 0 to {count - 1}")
     missing = OtherFile(path.name, problem="it has no simulated_mm for this frame", missing=True)
-    found = {n: replace(_checked(f"{path.name}#{n}", wire), where=f"{path}#{n}") for n, wire in points.items()}
+    read = {n: replace(_checked(f"{path.name}#{n}", wire), where=f"{path}#{n}") for n, wire in points.items()}
+    own = _refused_beside(path)
+    found = {n: replace(file, refused=own.get(n, file.refused)) for n, file in read.items()}
     return [found.get(n, missing) for n in range(count)]
+
+
+def _refused_beside(wires: Path) -> dict[int, tuple[str, ...]]:
+    """By number the frames whose simulation failed in the run that wrote these wires, and why; by no other file."""
+    if wires.name != "frames.h5":
+        return {}
+    try:
+        frames = records.read_json(wires.with_name("result.json")).get("frames", [])
+    except UnreadableError as error:
+        raise LoadError(str(error)) from None
+    why = ("status", "sentence", "message")
+    return {f["frame"]: tuple(f.get(key, "") for key in why) for f in frames if f.get("stage") == "simulate"}
 
 
 def _by_number(path: Path, frames: h5py.Group) -> dict[int, h5py.Group]:

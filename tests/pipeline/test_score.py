@@ -413,6 +413,18 @@ def test_another_simulators_wire_that_lies_in_itself_has_failed(known: Known, tm
     assert "wire_003.csv: the wire lies 0.0" in str(result["failures"])
 
 
+def test_a_wire_that_its_own_run_refused_has_failed(known: Known, tmp_path: Path) -> None:
+    """Three of four wires with too long segments, refused by their run, were ok in a score of its folder."""
+    out, words = tmp_path / "coarse", ["--until", "simulate", "--set", "solver.segment_mm=6", *QUICK]
+    assert main(["run", str(known[0]), "-o", str(out), *words]) == 1
+    code, table, result = run_with(known, f'"{out / "cases" / "bend" / "frames.h5"}"', "coarse")
+    own = json.loads((out / "cases" / "bend" / "result.json").read_text(encoding="utf-8"))["frames"]
+    assert code == 1
+    assert [*table["status"]] == [f["status"] if f["stage"] else "ok" for f in own]
+    assert "under_resolved" in [*table["status"]]
+    assert "frames.h5#1: a joint is turned by" in str(result["failures"])
+
+
 def test_a_wire_begins_at_the_clamps_plane() -> None:
     """Cut where its base passes it, continued back where it begins behind it; a wire that comes back is cut once."""
     wire = made()
