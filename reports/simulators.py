@@ -213,7 +213,7 @@ def in_common(rows: pd.DataFrame) -> str:
     some, few = table[table["frames_ok"] > 0], _with_few(table)
     named = listed([f"{row['simulator']} ({row['frames_ok']} of {most})" for row in few.to_dict("records")])
     left_out = f"too few frames for a skill beside others: {named}" if named else ""
-    if not shared <= _MOST_SHARED * most:
+    if not most or not shared <= _MOST_SHARED * most:
         return left_out
     fewer = some[(some["frames_ok"] < most) & ~some.index.isin(few.index)].to_dict("records")
     names = listed([f"{row['simulator']} ({row['frames_ok']})" for row in fewer])

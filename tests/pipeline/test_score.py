@@ -560,11 +560,18 @@ def test_where_curves_are_looked_for(known: Known, tmp_path: Path, capsys: pytes
     write_csv(full, known[1])
     (bare / "deeper").mkdir(parents=True)
     (bare / "notes.txt").touch()
+    (tmp_path / "text" / "bend").mkdir(parents=True)
+    (tmp_path / "text" / "bend" / "w0.txt").touch()
     ran = tmp_path / "ran"
     (ran / "cases" / "other").mkdir(parents=True)
     for curves, out, said in (
         (tmp_path / "nowhere", "o", f"\n--curves {tmp_path / 'nowhere'}: no such file or folder\n"),
         (bare, "o", "no wire in it (.csv, .vtp, .mrk.json, .vtk, .h5, .hdf5); found deeper/, notes.txt; give a folder"),
+        (
+            tmp_path / "text",
+            "o",
+            "no wire in it (.csv, .vtp, .mrk.json, .vtk, .h5, .hdf5); found w0.txt; give a folder",
+        ),
         (mixed, "o", ".csv and .vtp files"),
         (f"a={full}/*.vtk", "o", "it matches no file"),
         (f"a={tmp_path}/fu*", "o", "it matches a folder, full"),

@@ -176,6 +176,12 @@ def test_who_has_few_frames_takes_them_from_nobody(tmp_path: Path) -> None:
     assert list(ratios["common_frames"]) == [6, 6], "pairs are as they were"
 
 
+def test_without_a_frame_that_counts_none_are_in_common() -> None:
+    """It said "only 0 of 0 frames count for all simulators"."""
+    row = {"simulator": "one", "against": None, "frames_ok": 0, "common_frames": 0, "skill_strongest": None}
+    assert in_common(pd.DataFrame([row])) == ""
+
+
 def test_nothing_is_said_where_most_frames_count_for_all(compared: Path) -> None:
     assert in_common(tables.read(compared / "simulators.csv", SIMULATORS)) == ""
 
