@@ -133,7 +133,6 @@ def _with_intervals(frames: Sequence[Scored], points: Array, values: Row) -> dic
     ends = np.exp(0.5 * np.array(intervals.of_log_ratio(*by_insertion(frames, squares, points, points))))
     rms_ends = intervals.holding(values["rms_mm"], *map(float, ends))
     tips = intervals.of_medians([numbers(part, "tip_mm") for part in parts])
-    tips = intervals.holding(values["tip_median_mm"], *tips)
     mean_squares = [np.array([float(np.mean(f.error_mm**2)) for f in part]) for part in parts]
     found = {
         "insertions": len(names),
