@@ -1,5 +1,6 @@
 """The page of several simulators side by side, from simulators.csv and where.csv."""
 
+import math
 from collections.abc import Container, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -21,7 +22,6 @@ from reports.verdict import NEVER_NEAREST, badge, first_that_holds, tips_off, ve
 
 PAGE = "simulators.html"
 _MOST_WARNINGS, _MOST_REASONS = 5, 3
-_ENDS = ("low", "high")
 _MOST_SHARED = 0.75
 """Share of a simulator's frames up to which those that count for all of them are few."""
 
@@ -132,12 +132,13 @@ def _not_ours(warnings: Mapping[str, list[str]], ours: Mapping[str, list[str]]) 
 def _one_table(rows: pd.DataFrame, copied: Container[str]) -> tuple[pd.DataFrame, list[Column]]:
     """A row for each simulator: its own numbers, then the ratio of its error to that of every other one.
 
-    In order of rms_mm; below those, who has failed frames, which rms_mm leaves out, tips that it does not see,
-    or wires made from the traces. copied : these.
+    In order of rms_mm or, where it is larger, back_rms_mm: what a wire leaves out is no gain. Below those, who has
+    failed frames, which neither counts, tips that rms_mm does not see, or wires made from the traces. copied : these.
     """
     table = rows[rows["against"].isna()]
-    table = table.assign(doubtful=_doubtful(table, copied)).sort_values(["doubtful", "rms_mm"], kind="stable")
-    table = table.drop(columns="doubtful").reset_index(drop=True)
+    table = table.assign(doubtful=_doubtful(table, copied), far=[_farther_mm(row) for row in table.to_dict("records")])
+    table = table.sort_values(["doubtful", "far"], kind="stable")
+    table = table.drop(columns=["doubtful", "far"]).reset_index(drop=True)
     columns = _content.quoted_first(SIMULATORS.shown("cases"))
     pairs = rows[rows["against"].notna()]
     for other in table["simulator"][table["simulator"].isin(pairs["against"])]:
@@ -161,31 +162,45 @@ def _doubtful(table: pd.DataFrame, copied: Container[str]) -> "pd.Series[bool]":
     return table["frames_ok"].lt(table["frames"]) | table["simulator"].isin(_off(table, copied))
 
 
-def nearer(rows: Sequence[Mapping[Any, Any]], off: Container[str] = ()) -> list[str]:
-    """Of the simulator with the least rms_mm how it stands to every other one, a sentence each.
+def _farther_mm(row: Mapping[Any, Any]) -> float:
+    """The larger of a simulator's rms distances to the traced wires and from them."""
+    return max((float(row[name]) for name in ("rms_mm", "back_rms_mm") if pd.notna(row.get(name))), default=math.inf)
 
-    One with failed frames, which rms_mm leaves out, is held against one without.
+
+def nearer(rows: Sequence[Mapping[Any, Any]], off: Container[str] = ()) -> list[str]:
+    """Of the simulator with the least error how it stands to every other one, a sentence each.
+
+    The error is the larger of the two ways. One with failed frames, which it leaves out, is held against one without.
     rows : of simulators.csv.     off : simulators that are left out, since rms_mm does not judge them.
     """
     own = [row for row in rows if pd.isna(row.get("against")) and row["simulator"] not in off and row["frames_ok"] > 0]
     if not own:
         return []
-    best = min(own, key=lambda row: (row["frames_ok"] < row["frames"], float(row["rms_mm"])))["simulator"]
+    best = min(own, key=lambda row: (row["frames_ok"] < row["frames"], _farther_mm(row)))["simulator"]
     others = {row["simulator"] for row in own}
     return [_beside(row) for row in rows if row.get("against") == best and row["simulator"] in others]
 
 
 def _beside(row: Mapping[Any, Any]) -> str:
-    """Whether the simulator of a row is farther from the traced wires than that of ``against``."""
-    one, other, value = row["simulator"], row["against"], float(row["rms_ratio"])
-    low, high = (
-        float("nan") if pd.isna(row.get(f"rms_ratio_{end}")) else float(row[f"rms_ratio_{end}"]) for end in _ENDS
-    )
-    head = f"{other} is nearer than {one}" if low > 1.0 else f"{one} is nearer than {other}" if high < 1.0 else ""
+    """Whether the simulator of a row is farther from the traced wires than that of ``against``: both ways, or not."""
+    one, other = row["simulator"], row["against"]
+    (value, low, high), back = (_with_ends(row, name) for name in ("rms_ratio", "back_ratio"))
+    farther = low > 1.0 and (math.isnan(back[0]) or back[1] > 1.0)
+    closer = high < 1.0 and (math.isnan(back[0]) or back[2] < 1.0)
+    head = f"{other} is nearer than {one}" if farther else f"{one} is nearer than {other}" if closer else ""
     head = head or f"{other} is not shown to be nearer than {one}"
     known = f"95 % interval {low:.2f} to {high:.2f}; {row['interval']}" if low <= high else str(row["interval"])
     where = counted(int(row["common_frames"]), "frame")
-    return f"{head}: on {where} {one} lies {value:.2f} times as far from the traced wires ({known.rstrip('; ')})."
+    said = f"{head}: on {where} {one} lies {value:.2f} times as far from the traced wires ({known.rstrip('; ')})"
+    one_way = (low > 1.0 or high < 1.0) and not (farther or closer)
+    return said + f", but these {back[0]:.2f} times as far from it: does one end early?" * one_way + "." * (not one_way)
+
+
+def _with_ends(row: Mapping[Any, Any], name: str) -> tuple[float, float, float]:
+    """A ratio and the ends of its interval; NaN for what is empty."""
+    values = (row.get(name + end) for end in ("", "_low", "_high"))
+    value, low, high = (math.nan if pd.isna(one) else float(one) for one in values)
+    return value, low, high
 
 
 def in_common(rows: pd.DataFrame) -> str:
@@ -198,7 +213,7 @@ def in_common(rows: pd.DataFrame) -> str:
     some, few = table[table["frames_ok"] > 0], _with_few(table)
     named = listed([f"{row['simulator']} ({row['frames_ok']} of {most})" for row in few.to_dict("records")])
     left_out = f"too few frames for a skill beside others: {named}" if named else ""
-    if not shared <= _MOST_SHARED * most:
+    if not most or not shared <= _MOST_SHARED * most:
         return left_out
     fewer = some[(some["frames_ok"] < most) & ~some.index.isin(few.index)].to_dict("records")
     names = listed([f"{row['simulator']} ({row['frames_ok']})" for row in fewer])

@@ -10,13 +10,19 @@ from pipeline.model import Array, arc_length
 
 SAME_MM = 1e-6
 """Arc lengths closer than this are one."""
-UNITS_MM = {"mm": 1.0, "cm": 10.0, "inch": 25.4, "m": 1000.0, "µm": 1e-3}
+UNITS_MM = {
+    "mm": 1.0, "millimeter": 1.0, "millimetre": 1.0, "millimeters": 1.0, "um": 1e-3, "µm": 1e-3, "μm": 1e-3,
+    "micron": 1e-3, "microns": 1e-3, "micrometer": 1e-3, "cm": 10.0, "inch": 25.4, "inches": 25.4, "m": 1e3,
+    "meter": 1e3, "metre": 1e3, "meters": 1e3, "nm": 1e-6,
+}  # fmt: skip
+"""Units of length as files name them."""
+MISTAKEN = ("mm", "cm", "inch", "m", "µm")
 """Units in which a length may have been given by mistake."""
 
 
 def other_units(stated: str) -> dict[str, float]:
     """Factors by which lengths that were taken for ``stated`` grow where they are in another unit."""
-    return {name: factor / UNITS_MM[stated] for name, factor in UNITS_MM.items() if name != stated}
+    return {name: UNITS_MM[name] / UNITS_MM[stated] for name in MISTAKEN if UNITS_MM[name] != UNITS_MM[stated]}
 
 
 def unit_of(ratio: float, room: float, stated: str = "mm") -> str:

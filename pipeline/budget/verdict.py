@@ -32,10 +32,13 @@ def axes_across(curve_mm: Array, arc_mm: Array) -> Array:
 
 
 def widening(count: int) -> float:
-    """Squared radius of the 95 % ellipse in standard deviations, of a covariance from ``count`` members (Hotelling)."""
+    """Squared radius of the 95 % ellipse in standard deviations, of a second moment from ``count`` members (Hotelling).
+
+    It is about the nominal wire, which is no estimate: about a mean it would be (n + 1) / (n - 2) F(2, n - 2).
+    """
     if count < 4:
         return float("nan")
-    return float(2.0 * (count + 1) / (count - 1) * fdtri(2, count - 1, COVERED))
+    return float(2.0 * count / (count - 1) * fdtri(2, count - 1, COVERED))
 
 
 def reach_mm(covariance_mm2: Array, axes: Array, count: int) -> Array:

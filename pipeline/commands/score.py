@@ -25,7 +25,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     what = "folder of one wire a frame (.csv .vtp .vtk .mrk.json), of CASE/ folders, or an output of run; repeatable"
     add("--curves", action="append", required=True, metavar="[NAME=]DIR", help=what)
     add("--space", default="", choices=("LPS", "RAS"), help="of coordinates whose files do not state it")
-    add("--unit", default="", choices=("mm", "cm", "m"), help="of coordinates whose files do not state it")
+    add(
+        "--unit", default="", choices=("mm", "um", "cm", "m", "inch"), help="of coordinates whose files do not state it"
+    )
     add(
         "-o",
         "--out",

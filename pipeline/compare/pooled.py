@@ -64,6 +64,7 @@ def pooled(frames: Sequence[Scored]) -> dict[str, Any]:
         elif column.pooled in POOLING:
             values = numbers(frames, column.name)
             result[column.pooled_name] = _over_frames(POOLING[column.pooled], values, points)
+    result["tip_max_mm"] = _over_frames(POOLING["max"], numbers(frames, "tip_mm"), points)
     # by Pythagoras: one offset common to all frames is taken off, the part of the error along the wire that it explains
     left = result["arc_rms_mm"] ** 2 - result["depth_offset_mm"] ** 2
     result["arc_offset_rms_mm"] = float(np.sqrt(max(left, 0.0))) if np.isfinite(left) else float("nan")
@@ -132,7 +133,6 @@ def _with_intervals(frames: Sequence[Scored], points: Array, values: Row) -> dic
     ends = np.exp(0.5 * np.array(intervals.of_log_ratio(*by_insertion(frames, squares, points, points))))
     rms_ends = intervals.holding(values["rms_mm"], *map(float, ends))
     tips = intervals.of_medians([numbers(part, "tip_mm") for part in parts])
-    tips = intervals.holding(values["tip_median_mm"], *tips)
     mean_squares = [np.array([float(np.mean(f.error_mm**2)) for f in part]) for part in parts]
     found = {
         "insertions": len(names),

@@ -6,10 +6,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.arrays.polyline import UNITS_MM
 from pipeline.load.chain import one_chain
 from pipeline.load.geometry import refused, unusable
 from pipeline.load.guard import reachable, read_json, told
-from pipeline.load.outside import UNITS_MM, millimetres, to_number
+from pipeline.load.outside import millimetres, to_number
 from pipeline.load.stated import stated_in_table
 from pipeline.load.surfaces import RAS_TO_LPS, read_vtp
 from pipeline.load.tables import rows_of

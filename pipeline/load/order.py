@@ -2,7 +2,7 @@
 
 import re
 from collections import defaultdict
-from collections.abc import Callable, Collection, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from itertools import pairwise
 from statistics import fmean, pstdev
 from typing import Any, TypeVar
@@ -22,6 +22,16 @@ def in_order(items: Iterable[T], name: Callable[[T], str] = str) -> list[T]:
     named = [(name(item), item) for item in items]
     counted = _counted([text for text, _ in named])
     return [item for _, item in sorted(named, key=lambda one: _key(one[0], counted))]
+
+
+def last_counts(names: Sequence[str]) -> list[int | None]:
+    """The last number of each name; None without one, or for a decimal, as of a depth: 31.2 mm is no frame 2."""
+    counted, found = _counted(names), [[*_numbers(name)] for name in names]
+    return [_count(*numbers[-1], counted) if numbers else None for numbers in found]
+
+
+def _count(place: Place, whole: str, after: str, counted: set[Place]) -> int | None:
+    return None if after and place not in counted else int(after or whole)
 
 
 def _numbers(text: str) -> Iterator[tuple[Place, str, str]]:

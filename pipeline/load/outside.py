@@ -8,14 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.arrays.polyline import UNITS_MM
 from pipeline.load.geometry import LoadError, unusable
 from reports.texts import NUMBER
 
-UNITS_MM = {
-    "mm": 1.0, "millimeter": 1.0, "millimetre": 1.0, "millimeters": 1.0, "um": 1e-3, "µm": 1e-3, "μm": 1e-3,
-    "micron": 1e-3, "microns": 1e-3, "micrometer": 1e-3, "cm": 10.0, "m": 1e3, "meter": 1e3, "metre": 1e3,
-    "meters": 1e3, "nm": 1e-6,
-}  # fmt: skip
 MOST_PARTS = 100_000
 PATTERN = re.compile(r"%0?\d{0,2}d")
 """The one pattern that a header may hold: a number. It goes to no printf of any library."""
@@ -25,7 +21,7 @@ def millimetres(what: object, unit: str) -> float:
     """Millimetres of a unit of length by its name."""
     name = unit.strip().strip('"').lower()
     if name not in UNITS_MM:
-        allowed = "mm, um, cm, m, nm"
+        allowed = "mm, um, cm, m, inch, nm"
         raise unusable(what, f"lengths in {unit!r}; allowed: {allowed}; convert the file")
     return UNITS_MM[name]
 

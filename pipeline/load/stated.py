@@ -4,8 +4,8 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
+from pipeline.arrays.polyline import UNITS_MM
 from pipeline.load.geometry import refused, unusable
-from pipeline.load.outside import UNITS_MM
 from pipeline.load.surfaces import SPACE, named_space, space_of
 
 HEAD = 4096  # bytes of a file of 3D Slicer or VTK in which it says what it is

@@ -4,7 +4,6 @@ What a file's numbers mean is stated, by the file, its format or whoever names i
 or RAS that is taken for mm and LPS is another wire. A frame without a usable wire is known as such and by its reason.
 """
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,21 +11,24 @@ from pathlib import Path
 import h5py
 import numpy as np
 
+from pipeline.arrays.polyline import UNITS_MM
 from pipeline.load.curves import READERS, distinct, points_in_table
 from pipeline.load.geometry import LoadError, Source, refused, unusable
 from pipeline.load.guard import size_of
 from pipeline.load.hdf5 import require_written
-from pipeline.load.outside import to_whole
+from pipeline.load.order import last_counts
+from pipeline.load.outside import millimetres, to_whole
 from pipeline.load.stated import stated_in, stated_in_table
 from pipeline.load.surfaces import RAS_TO_LPS
 from pipeline.load.tables import rows_of
 from pipeline.load.vtk import read_vtk_points
 from pipeline.model import Array
+from reports import records
+from reports.texts import UnreadableError
 
 OF_KIND = {**READERS, ".vtk": read_vtk_points}
 IN_HDF5 = (".h5", ".hdf5")
 KINDS = (".csv", *OF_KIND, *IN_HDF5)
-UNITS_MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0}
 USUAL = {"space": "LPS", "unit": "mm"}
 """What is stated of coordinates, in the order of ``stated_in``, and what most have."""
 
@@ -37,6 +39,7 @@ class OtherFile:
 
     missing : the simulator wrote nothing for the frame.     unclear : nobody says what its numbers mean, or two say
     different things.     where : the file with its folder, empty where there is none.     unit : stated of its numbers.
+    refused : status, sentence and message of a wire that its own run refused.
     """
 
     name: str
@@ -46,6 +49,7 @@ class OtherFile:
     unclear: bool = False
     where: str = ""
     unit: str = "mm"
+    refused: tuple[str, ...] = ("", "", "")
 
 
 def kind_of(path: Path) -> str:
@@ -74,11 +78,14 @@ def read_wires(files: Sequence[Source], count: int, space: str = "", unit: str =
 
 
 def numbered_frames(paths: Sequence[Path], count: int) -> dict[int, Path]:
-    """Files by frame: by the last number in their names, counted from 0 or 1, else in the order given."""
-    found = [re.findall(r"\d+", path.name.lower().removesuffix(kind_of(path))) for path in paths]
-    numbers = [int(digits[-1]) if digits else -1 for digits in found]
+    """Files by frame: by the last number in their names, counted from 0 or 1, else in the order given.
+
+    Names of depths are in order, but which one is missing they do not tell.
+    """
+    found = last_counts([path.name.lower().removesuffix(kind_of(path)) for path in paths])
+    numbers = [number for number in found if number is not None]
     unique = set(numbers)
-    if len(unique) == len(numbers) and -1 not in unique and paths:
+    if len(unique) == len(paths) and paths:
         first = 1 if 0 not in unique and count in unique else 0
         if (0 in unique or count in unique) and unique <= set(range(first, first + count)):
             return {number - first: path for number, path in zip(numbers, paths, strict=True)}
@@ -91,7 +98,8 @@ def numbered_frames(paths: Sequence[Path], count: int) -> dict[int, Path]:
         raise unusable(paths[0].parent, f"{why} frame's wire; {do} (/frames/NNN/simulated_mm)")
     shown = f"{len(paths)} files, {paths[0].name} to {paths[-1].name}, for {count} frames"
     do = f"number them from 0 to {count - 1}; an empty file stands for a frame that the simulator failed in"
-    raise unusable(paths[0].parent, f"got {shown}: it is not known which belongs to which; {do}")
+    unnumbered = " (a decimal, as of a depth, is no number of a frame)" * (None in found)
+    raise unusable(paths[0].parent, f"got {shown}: it is not known which belongs to which{unnumbered}; {do}")
 
 
 def _in_hdf5(path: Path, count: int, space: str, unit: str) -> list[OtherFile]:
@@ -110,8 +118,22 @@ def _in_hdf5(path: Path, count: int, space: str, unit: str) -> list[OtherFile]:
     if beyond:
         raise unusable(path, f"got frame {beyond[0]} for {count} frames; number them from 0 to {count - 1}")
     missing = OtherFile(path.name, problem="it has no simulated_mm for this frame", missing=True)
-    found = {n: replace(_checked(f"{path.name}#{n}", wire), where=f"{path}#{n}") for n, wire in points.items()}
+    read = {n: replace(_checked(f"{path.name}#{n}", wire), where=f"{path}#{n}") for n, wire in points.items()}
+    own = _refused_beside(path)
+    found = {n: replace(file, refused=own.get(n, file.refused)) for n, file in read.items()}
     return [found.get(n, missing) for n in range(count)]
+
+
+def _refused_beside(wires: Path) -> dict[int, tuple[str, ...]]:
+    """By number the frames whose simulation failed in the run that wrote these wires, and why; by no other file."""
+    if wires.name != "frames.h5":
+        return {}
+    try:
+        frames = records.read_json(wires.with_name("result.json")).get("frames", [])
+    except UnreadableError as error:
+        raise LoadError(str(error)) from None
+    why = ("status", "sentence", "message")
+    return {f["frame"]: tuple(f.get(key, "") for key in why) for f in frames if f.get("stage") == "simulate"}
 
 
 def _by_number(path: Path, frames: h5py.Group) -> dict[int, h5py.Group]:
@@ -149,7 +171,7 @@ def _read(path: Path, space: str, unit: str) -> OtherFile:
         return OtherFile(path.name, problem=str(error).removeprefix(f"{path}: "), unclear=True)
     # all readers but that of tables convert a file that states RAS by themselves
     turned = in_space == "RAS" and (table is not None or not own[0])
-    factor = 1.0 if kind == ".mrk.json" else UNITS_MM[in_unit]  # the reader of .mrk.json converts units itself
+    factor = 1.0 if kind == ".mrk.json" else millimetres(path, in_unit)  # the reader of .mrk.json converts units itself
     return replace(_checked(path.name, points * factor * (RAS_TO_LPS if turned else 1.0)), unit=in_unit)
 
 
@@ -157,13 +179,13 @@ def _agreed(path: Path, by_file: tuple[str, str], by_caller: tuple[str, str]) ->
     """Space and unit of a file, as it or the caller states them; LoadError where neither does, or they differ."""
     own, given = (dict(zip(USUAL, stated, strict=True)) for stated in (by_file, by_caller))
     for what in USUAL:
-        if own[what] and given[what] and own[what] != given[what]:
+        said, typed = (UNITS_MM.get(value, value) for value in (own[what], given[what]))
+        if said and typed and said != typed:
             raise unusable(path, f"{what}: the file says {own[what]}, stated was {given[what]}; correct one of them")
     agreed = {what: own[what] or given[what] for what in USUAL}
     if missing := [what for what in USUAL if not agreed[what]]:
         raise unusable(path, _unstated(missing, kind_of(path)))
-    if agreed["unit"] not in UNITS_MM:
-        raise unusable(path, f"unit {agreed['unit']!r}; allowed: {', '.join(UNITS_MM)}")
+    millimetres(path, agreed["unit"])
     return agreed["space"], agreed["unit"]
 
 

@@ -75,16 +75,15 @@ def copies(found: Sequence[Found]) -> list[str]:
             both = tuple(sorted((case.insertion, other)))
             pairs.setdefault(both, []).append((float(np.sqrt(squares / count)), sigma))
     farthest = {both: max(ways) for both, ways in pairs.items()}
-    written = {both: mm for both, (mm, sigma) in farthest.items() if mm < ALIKE * sigma}
-    near = {both: mm for both, (mm, sigma) in farthest.items() if ALIKE * sigma <= mm < ONE_WIRE * sigma}
-    alike = {both: mm for both, mm in near.items() if not _stated_apart(both, found)}
-    known_to = min((sigma for _, sigma in farthest.values()), default=math.nan)
+    written = {both: way for both, way in farthest.items() if way[0] < ALIKE * way[1]}
+    near = {both: way for both, way in farthest.items() if ALIKE * way[1] <= way[0] < ONE_WIRE * way[1]}
+    alike = {both: way for both, way in near.items() if not _stated_apart(both, found)}
     return [
         f"insertions {listed([*map(repr, names)])} are traced to within {apart:.2g} mm of another of them, where "
         f"traces are known to {known_to:.2g} mm: they {what}{COUNT_AS}{len(names)}; give their cases one "
         f"group{or_else}"
         for found_alike, what, or_else in ((written, WRITTEN, ""), (alike, RESCANNED, OR_ELSE))
-        for names, apart in _together(found_alike)
+        for names, apart, known_to in _together(found_alike)
     ]
 
 
@@ -102,14 +101,20 @@ def _apart_deg(one: Set[float], other: Set[float]) -> float:
     return float(max(off.min(axis=0).max(), off.min(axis=1).max())) if off.size else 0.0
 
 
-def _together(apart: Mapping[tuple[str, ...], float]) -> list[tuple[list[str], float]]:
-    """Insertions that pairs join, be it through others, and how far those of a pair are apart at the most."""
+def _together(pairs: Mapping[tuple[str, ...], tuple[float, float]]) -> list[tuple[list[str], float, float]]:
+    """Insertions that pairs join, be it through others, how far those of a pair are apart at the most, and the least
+    that their traces are known to. pairs : both of each, mm.
+    """
     sets: DisjointSet[str] = DisjointSet()
-    for one, other in apart:
+    for one, other in pairs:
         sets.add(one)
         sets.add(other)
         sets.merge(one, other)
-    return [(sorted(names), max(mm for both, mm in apart.items() if both[0] in names)) for names in sets.subsets()]
+    found = []
+    for names in sets.subsets():
+        apart, known_to = zip(*(way for both, way in pairs.items() if both[0] in names), strict=True)
+        found.append((sorted(names), max(apart), min(known_to)))
+    return found
 
 
 def _with_another(case: Found, shared: Sequence[Found], traces: Mapping[str, Traces], config: CompareConfig) -> Found:

@@ -171,11 +171,14 @@ def depth_offset(found: Gathered, fit: Calibration) -> tuple[float, float]:
     for trial, point, stated in zip(found.trials, points, found.stated_mm, strict=True):
         apart = np.array(depths_at(trial, point)) - stated
         off[trial.group] = np.append(off.get(trial.group, []), apart[np.isfinite(apart)])
-    means = [float(np.mean(apart)) for apart in off.values() if len(apart)]
-    spread = [float(np.std(apart) / np.sqrt(len(apart))) for apart in off.values() if len(apart)]
-    if not means:
+    each = [apart for apart in off.values() if len(apart)]
+    if not each:
         return float("nan"), float("nan")
-    return over_insertions(means, spread)
+    # one standard deviation for all: a single depth of an insertion has none of its own
+    left = np.concatenate([apart - np.mean(apart) for apart in each])
+    free = len(left) - len(each)
+    sd = float(np.sqrt(left @ left / free)) if free else SAME_MM
+    return over_insertions([float(np.mean(apart)) for apart in each], [sd / len(apart) ** 0.5 for apart in each])
 
 
 def over_insertions(means_mm: Sequence[float], spread_mm: Sequence[float]) -> tuple[float, float]:

@@ -14,6 +14,7 @@ from scipy.cluster.hierarchy import DisjointSet
 
 from pipeline.compare import intervals
 from pipeline.compare.pooled import Scored, by_insertion, is_pooled, numbers, pooled, skill, squares_of, within
+from pipeline.model import Array
 from pipeline.run import ledger
 from pipeline.run.results import Result, found_results, lost, untold
 from pipeline.run.stages.known import UP_TO_TRACE
@@ -192,13 +193,17 @@ def overall(found: Sequence[Found], missing: Sequence[Result] = ()) -> dict[str,
 
 @dataclass(frozen=True)
 class Ratio:
-    """Pooled rms of one run over that of another, on the frames that count in both; note : see ``intervals.note``."""
+    """Pooled rms of one run over that of another, on the frames that count in both; note : see ``intervals.note``.
+
+    back : the same of the distances from the traced to the simulated wires, with its interval; NaN without any.
+    """
 
     value: float
     low: float
     high: float
     frames: int
     note: str
+    back: tuple[float, float, float] = (float("nan"),) * 3
 
     @property
     def sentence(self) -> str:
@@ -223,8 +228,14 @@ class Ratio:
             more = "whether by more" if self.value > allowed else "by no more"
             meaning = f"the second's errors are larger, {more} than is allowed (ratio {allowed:g})"
             meaning += " is not shown" * (self.value > allowed)
+        elif self.low > 1.0:
+            meaning = "the second is worse"
+        elif self.back[2] >= 1.0:
+            meaning = (
+                "no difference is shown: the other way, from the traced wires, the second is not shown to be better"
+            )
         else:
-            meaning = "the second is worse" if self.low > 1.0 else "the second is better"
+            meaning = "the second is better"
         return f"{self.sentence}: {meaning}"
 
 
@@ -252,14 +263,22 @@ def ratio(before: Sequence[Found], after: Sequence[Found]) -> Ratio | None:
     if not both:
         return None
     first, second = [a for a, _ in both], [b for _, b in both]
-    points = np.array([float(len(frame.error_mm)) for frame in second])
+    ways = [squares_of(frames) / [len(f.error_mm) for f in frames] for frames in (first, second)]
+    back = [numbers(frames, "back_rms_mm") ** 2 for frames in (first, second)]
+    note = intervals.note(len({frame.insertion for frame in second}))
+    return Ratio(*_of_squares(second, *ways), len(both), note, _of_squares(second, *back))
+
+
+def _of_squares(frames: Sequence[Scored], before: Array, after: Array) -> tuple[float, float, float]:
+    """Root of the ratio of two runs' mean squares (frames,), with its interval; NaN where a frame lacks one."""
+    if not np.isfinite(before + after).all():
+        return (float("nan"),) * 3
     # wires of other lengths have other numbers of points: both runs' mean squares are weighted by those of ``after``
-    each = [squares_of(frames) / [len(f.error_mm) for f in frames] * points for frames in (first, second)]
-    under, over, weights = by_insertion(second, *each, points)
+    points = np.array([float(len(frame.error_mm)) for frame in frames])
+    under, over, weights = by_insertion(frames, before * points, after * points, points)
     low, high = np.exp(0.5 * np.array(intervals.of_log_ratio(over, under, weights)))
     total = np.maximum([over.sum(), under.sum()], intervals.SMALLEST_MM2)
-    value = float(np.sqrt(total[0] / total[1]))
-    return Ratio(value, float(low), float(high), len(both), intervals.note(len(weights)))
+    return float(np.sqrt(total[0] / total[1])), float(low), float(high)
 
 
 def skill_beside(before: Sequence[Found], after: Sequence[Found], null: str) -> dict[str, float]:

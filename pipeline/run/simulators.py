@@ -29,12 +29,17 @@ from reports.verdict import COPIED, TIPS_OFF, tips_off
 STEPS_MM = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
 MOST_BINS = 12
 OF_SKILL = ("skill_strongest", "skill_strongest_low", "skill_strongest_high", "strongest_null", "strongest_frames")
+RATIOS = ("rms_ratio", "rms_ratio_low", "rms_ratio_high", "back_ratio", "back_ratio_low", "back_ratio_high")
 FEW = 0.5
 """Share of the frames of the simulator that has most below which one's few frames are not asked of all."""
 Studies = Mapping[str, Sequence[Found]]
 Frames = Set[tuple[str, int]]
 Off = Mapping[str, str]
 """Why simulators are never the nearest."""
+
+
+SAME_END_MM = 0.25
+"""Wires whose ends are no farther apart reach equally far: half a step of the points that errors are taken at."""
 
 
 class Piece(NamedTuple):
@@ -60,7 +65,8 @@ def write_comparison(out: Path, folders: Mapping[str, Path]) -> list[str]:
         both = ratio(studies[other], studies[one])
         if both is not None:
             caveat = _caveat({name for name in (one, other) if off.get(name) == TIPS_OFF})
-            values = {"rms_ratio": both.value, "rms_ratio_low": both.low, "rms_ratio_high": both.high}
+            found = zip(RATIOS, (both.value, both.low, both.high, *both.back), strict=True)
+            values = {name: value for name, value in found if name in RATIOS[:3] or np.isfinite(both.back[0])}
             row, told = intervals.fields(values, "; ".join([both.note, *caveat]))
             rows.append({"simulator": one, "against": other, "common_frames": both.frames, "interval": told, **row})
             if other == OURS:
@@ -148,7 +154,7 @@ def _where(folders: Mapping[str, Path], judged: Studies, common: Frames, off: Of
     off : simulators whose tips lie off, or that were made from the traces: distances to the traced wire do not show
     that, so these are never the nearest.     judged : those that have all ``common`` frames.
     """
-    points = {name: list(_points(folders[name], found, common)) for name, found in judged.items()}
+    points = _as_far({name: dict(_points(folders[name], found, common)) for name, found in judged.items()})
     for along, place in (("distance from the tip", 1), ("insertion depth", 2)):
         values = [np.max(part[place]) for parts in points.values() for part in parts]
         if not values:
@@ -163,9 +169,28 @@ def _where(folders: Mapping[str, Path], judged: Studies, common: Frames, off: Of
 
 Part = tuple[str, Array, Array, Array]
 """One frame: its insertion, distances from the tip (n,), its depth n times (n,), errors (n,); mm."""
+Key = tuple[str, int]
 
 
-def _points(folder: Path, found: Sequence[Found], common: Frames) -> Iterator[Part]:
+def _as_far(points: Mapping[str, Mapping[Key, Part]]) -> dict[str, list[Part]]:
+    """Each simulator's frames as far as all reach, counted back from there; ``points`` have arc lengths instead.
+
+    Counted from its own tip, a wire that ends 2 mm early, before the error grows, had the lead at the tip.
+    """
+    ends = {
+        key: min(float(parts[key][1].max()) for parts in points.values()) for key in next(iter(points.values()), {})
+    }
+    kept: dict[str, list[Part]] = {}
+    for name, parts in points.items():
+        kept[name] = []
+        for key, (insertion, arc, depth, error) in parts.items():
+            use = arc <= ends[key] + SAME_END_MM
+            kept[name].append((insertion, arc[use].max() - arc[use], depth[use], error[use]))
+    return kept
+
+
+def _points(folder: Path, found: Sequence[Found], common: Frames) -> Iterator[tuple[Key, Part]]:
+    """The common frames, with arc lengths in the place of distances from the tip."""
     for case in validation(found):
         if not any((case.result.case, number) in common for number in case.frames):
             continue
@@ -175,7 +200,7 @@ def _points(folder: Path, found: Sequence[Found], common: Frames) -> Iterator[Pa
             if (case.result.case, number) in common:
                 mine = arc[frames == number]
                 depth = np.full(len(mine), float(frame.row["insertion_mm"]))
-                yield frame.insertion, mine.max() - mine, depth, frame.error_mm
+                yield (case.result.case, number), (frame.insertion, mine, depth, frame.error_mm)
 
 
 def _pieces(parts: Sequence[Part], place: int, low: float, high: float) -> list[Piece]:

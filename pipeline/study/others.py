@@ -21,7 +21,7 @@ class Others(Strict):
 
     files: Sources = ()
     space: Literal["", "LPS", "RAS"] = ""
-    unit: Literal["", "mm", "cm", "m"] = ""
+    unit: Literal["", "mm", "um", "cm", "m", "inch"] = ""
 
 
 def written_out(value: Any) -> Any:
@@ -59,15 +59,22 @@ def found_for(case: str, place: Path, cases: Sequence[str]) -> list[str]:
         return _refuse(case, place, f"found neither {case}/ nor {case}.h5 in it")
     if here.is_file():
         return [str(here)]
-    inside = [path for path in here.iterdir() if path.is_file() and kind_of(path)]
+    inside = _wires_in(here)
     kinds = sorted({kind_of(path) for path in inside})
     if len(kinds) > 1:
         return _refuse(case, here, f"it holds {' and '.join(kinds)} files; name one kind, as in {here}/*{kinds[0]}")
-    if here == place and not inside:
-        names = sorted((f"{p.name}/" * p.is_dir() or p.name) for p in here.iterdir())
+    names = sorted((f"{p.name}/" * p.is_dir() or p.name) for p in here.iterdir() if not p.name.startswith("."))
+    # beside wires of other cases what lies there may be the log of a crash
+    unread = names and not any(_wires_in(path) for one in cases for path in _places(one, place))
+    if not inside and (here == place or unread):
         found = f"; found {', '.join(names[:4])}{' ...' * (len(names) > 4)}" if names else "; it is empty"
         return _refuse(case, here, f"no wire in it ({', '.join(KINDS)}){found}")
     return _sorted(inside)
+
+
+def _wires_in(place: Path) -> list[Path]:
+    """The files of a folder that are read as wires."""
+    return [path for path in place.iterdir() if path.is_file() and kind_of(path)] if is_folder(place) else []
 
 
 def _places(case: str, place: Path) -> list[Path]:

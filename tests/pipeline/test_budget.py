@@ -213,6 +213,16 @@ def test_ninety_five_of_a_hundred_right_errors_are_within_two_u(count: int) -> N
     assert np.mean(inside) == pytest.approx(0.95, abs=0.02)
 
 
+def test_so_many_are_where_the_fewest_members_tell() -> None:
+    """Eight, about the nominal wire: 96.1 % were, by the formula for what lies about a mean."""
+    rng, count, points = np.random.default_rng(5), 8, 60_000
+    wires, error = rng.normal(size=(count, points, 3)), rng.normal(size=(points, 3))
+    moment = np.einsum("mni,mnj->nij", wires, wires) / count
+    axes = axes_across(ALONG_Z, np.full(points, 15.0))
+    inside = judged(error, moment, np.zeros(points), axes, count).ratio <= 2.0
+    assert np.mean(inside) == pytest.approx(0.95, abs=0.003)  # three sigma
+
+
 def test_only_what_lies_across_counts_and_a_round_u_is_the_mean() -> None:
     axes = axes_across(ALONG_Z, np.full(1, 15.0))
     along = judged(np.array([[0.0, 0.0, 9.0]]), 0.01 * np.eye(3)[None], np.zeros(1), axes, 1000)

@@ -558,6 +558,22 @@ def test_depths_of_one_insertion_are_one_offset(monkeypatch):
         assert depth_offset(found, fit) == pytest.approx((0.5, sd), rel=0.01)
 
 
+def test_a_single_stated_depth_is_not_known_exactly(monkeypatch):
+    """Its own standard error was 0, and that of two was taken with n for n - 1."""
+    monkeypatch.setattr("pipeline.run.calibration.depths_at", lambda trial, _: trial.depths)
+    fit: Any = SimpleNamespace(
+        fit=SimpleNamespace(linear=SimpleNamespace(x=None), problem=SimpleNamespace(points=lambda _: [None] * 2))
+    )
+    off = {"a": [10.3, 20.5], "b": [10.4, np.nan]}
+    trials = [SimpleNamespace(group=name, depths=depths) for name, depths in off.items()]
+    found: Any = SimpleNamespace(trials=trials, stated_mm=(np.array([10.0, 20.0]), np.array([10.0, np.nan])))
+    sd = np.std([0.3, 0.5], ddof=1)
+    assert depth_offset(found, fit) == pytest.approx(over_insertions([0.4, 0.4], [sd / np.sqrt(2.0), sd]))
+    found = SimpleNamespace(trials=trials[1:], stated_mm=(np.array([10.0, np.nan]),))
+    fit.fit.problem.points = lambda _: [None]
+    assert depth_offset(found, fit)[1] == pytest.approx(np.sqrt(2.0) * SAME_MM)
+
+
 @pytest.mark.parametrize("off_mm", [0.0, 0.002])
 def test_a_case_whose_traces_are_those_of_another_is_left_out(study, off_mm):
     """Three copies counted as three insertions, without a word: the roll was known to 2.9 degrees for 5."""

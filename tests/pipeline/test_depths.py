@@ -98,6 +98,16 @@ def test_a_scale_that_is_off_is_told_where_depths_were_read_well() -> None:
     assert sum(map(len, by_hand)) <= 4
 
 
+@pytest.mark.parametrize(("deviations", "told"), [(8.0, False), (9.0, True), (-8.0, False), (-9.0, True)])
+def test_a_scale_may_be_wrong_either_way(deviations: float, told: bool) -> None:
+    """Of four degrees of freedom a slope is 8.6 standard deviations off by chance once in 1000, to one side 7.2."""
+    stated = np.array(DEPTHS)
+    left = 0.05 * np.array([5.0, -1.0, -4.0, -4.0, -1.0, 5.0])  # no slope fits any of it
+    slope = deviations * np.sqrt(left @ left / 4 / np.sum((stated - stated.mean()) ** 2))
+    seen = frames([*(stated + slope * (stated - stated.mean()) + left)], DEPTHS)
+    assert bool(on_another_scale(seen, from_entry(seen))) is told
+
+
 def test_depths_that_are_refused_count_among_those_counted_from_elsewhere() -> None:
     """2 mm in each of five frames: two were refused, alone, and three were too few to be told of."""
     seen = frames([d - 1.9 for d in DEPTHS[:5]], DEPTHS[:5])

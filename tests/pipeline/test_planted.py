@@ -7,6 +7,7 @@ centreline they kept 0.74 to 0.82 in the circle of Willis.
 from __future__ import annotations
 
 import json
+import math
 import shutil
 import tomllib
 from dataclasses import replace
@@ -19,11 +20,13 @@ import SimpleITK as sitk
 
 from pipeline.cli import main
 from pipeline.compare.config import CompareConfig
+from pipeline.compare.pooled import Scored
 from pipeline.run import kin, ledger
 from pipeline.run.another import copies, with_another
 from pipeline.run.exchanged import exchanged
 from pipeline.run.kin import told_of_kin
 from pipeline.run.overall import Found, found_cases, phantoms_of, strangers
+from pipeline.run.results import untold
 from pipeline.run.traced import compare_of
 from reports.doubts import Doubt
 from tests.later import later
@@ -301,6 +304,20 @@ def test_scans_of_one_wire_under_several_names_are_told(out: Path) -> None:
     (said,) = copies(alike)
     assert said.startswith("insertions 'bend', 'bend-2', 'bend-3' are traced to within 0.0032 mm of another of")
     assert "they are one scan, written again, and count as 3; give their cases one group" in said
+
+
+@pytest.mark.parametrize("sigma", [math.nan, 0.004])
+def test_what_traces_are_known_to_is_of_the_insertions_that_are_named(sigma: float) -> None:
+    """It was the least of all pairs, or NaN: "known to nan mm" for two whose traces are known to 0.05 mm."""
+
+    def case(name: str, known_to: float, other: str, mm: float) -> Found:
+        frame = Scored({"trace_sigma_mm": known_to}, np.zeros(1), np.zeros(1), name, {other: (10 * mm**2, 10)})
+        return Found(untold(name), {0: frame}, insertion=name)
+
+    apart = [case("c", sigma, "d", 8.0), case("d", sigma, "c", 8.0)]
+    (said,) = copies([*apart, case("a", 0.05, "b", 5e-4), case("b", 0.05, "a", 5e-4)])
+    assert "insertions 'a', 'b' are traced to within 0.0005 mm" in said
+    assert "known to 0.05 mm" in said
 
 
 def test_one_wire_that_was_scanned_again_is_told(out: Path) -> None:

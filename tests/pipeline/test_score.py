@@ -413,6 +413,18 @@ def test_another_simulators_wire_that_lies_in_itself_has_failed(known: Known, tm
     assert "wire_003.csv: the wire lies 0.0" in str(result["failures"])
 
 
+def test_a_wire_that_its_own_run_refused_has_failed(known: Known, tmp_path: Path) -> None:
+    """Three of four wires with too long segments, refused by their run, were ok in a score of its folder."""
+    out, words = tmp_path / "coarse", ["--until", "simulate", "--set", "solver.segment_mm=6", *QUICK]
+    assert main(["run", str(known[0]), "-o", str(out), *words]) == 1
+    code, table, result = run_with(known, f'"{out / "cases" / "bend" / "frames.h5"}"', "coarse")
+    own = json.loads((out / "cases" / "bend" / "result.json").read_text(encoding="utf-8"))["frames"]
+    assert code == 1
+    assert [*table["status"]] == [f["status"] if f["stage"] else "ok" for f in own]
+    assert "under_resolved" in [*table["status"]]
+    assert "frames.h5#1: a joint is turned by" in str(result["failures"])
+
+
 def test_a_wire_begins_at_the_clamps_plane() -> None:
     """Cut where its base passes it, continued back where it begins behind it; a wire that comes back is cut once."""
     wire = made()
@@ -474,7 +486,7 @@ def test_what_is_wrong_with_all_is_refused(known: Known, tmp_path: Path, capsys:
         ("bare", write_csv(tmp_path / "bare", wires, "x,y,z"), "space and unit are not stated"),
         ("cm", write_csv(tmp_path / "cm", wires, "# unit: cm\nx,y,z"), "space is not stated and will not be guessed"),
         ("unit", write_csv(tmp_path / "unit", wires, "# space: LPS\nx,y,z"), "unit is not stated"),
-        ("feet", write_csv(tmp_path / "feet", wires, "# space: LPS\n# unit: ft\nx,y,z"), "unit 'ft'"),
+        ("feet", write_csv(tmp_path / "feet", wires, "# space: LPS\n# unit: ft\nx,y,z"), "lengths in 'ft'"),
         ("five", write_csv(tmp_path / "five", [*wires, wires[-1]]), "5 files, wire_000.csv to wire_004.csv, for 4"),
         ("late", write_csv(tmp_path / "late", wires[1:3], first=1), "not known which belongs to which"),
         ("turned", write_csv(tmp_path / "turned", [w[::-1] for w in wires]), "tip first"),
@@ -506,8 +518,10 @@ def test_every_format_and_what_it_states(tmp_path: Path) -> None:
         for n, w in enumerate(wires):
             file[f"frames/{n:03d}/simulated_mm"] = w
     write_csv(tmp_path / "ras", [w * [-1e-3, -1e-3, 1e-3] for w in wires], "# space: RAS\n# unit: m\nx,y,z")
+    write_csv(tmp_path / "inch", [w / 25.4 for w in wires], "# space: LPS\n# unit: inch\nx,y,z")
+    write_csv(tmp_path / "micron", [w * 1e3 for w in wires], "# space: LPS\n# unit: micron\nx,y,z")
     write_csv(tmp_path / "waiting", [np.concatenate([w[:1], w[:1], w]) for w in wires], first=1)
-    for place in ("vtp", "mrk", "vtk", "all.h5", "ras", "waiting"):
+    for place in ("vtp", "mrk", "vtk", "all.h5", "ras", "inch", "micron", "waiting"):
         path = tmp_path / place
         files = [Source(p) for p in ([path] if path.is_file() else sorted(path.iterdir()))]
         for found, wire in zip(read_wires(files, 2), wires, strict=True):
@@ -525,7 +539,9 @@ def test_which_file_is_which_frame() -> None:
     assert frames("w1 w2 w4", 4) == {0: "w1", 1: "w2", 3: "w4"}
     assert frames("w10.5 w20.5", 2) == {0: "w10.5", 1: "w20.5"}
     assert frames("a b", 2) == {0: "a", 1: "b"}
-    for names, count in (("w1 w2", 4), ("w0 w7", 4), ("a b", 3), ("w0 w1 w2", 2)):
+    depths = "w8.1mm w18.0mm w27.3mm w37.2mm"
+    assert [*frames(depths, 4).values()] == depths.split(), "by their last digits they were frames 1, 0, 3 and 2"
+    for names, count in (("w31.0mm w32.1mm w33.2mm", 4), ("w1 w2", 4), ("w0 w7", 4), ("a b", 3), ("w0 w1 w2", 2)):
         with pytest.raises(LoadError, match="not known which belongs to which"):
             frames(names, count)
 
@@ -544,11 +560,18 @@ def test_where_curves_are_looked_for(known: Known, tmp_path: Path, capsys: pytes
     write_csv(full, known[1])
     (bare / "deeper").mkdir(parents=True)
     (bare / "notes.txt").touch()
+    (tmp_path / "text" / "bend").mkdir(parents=True)
+    (tmp_path / "text" / "bend" / "w0.txt").touch()
     ran = tmp_path / "ran"
     (ran / "cases" / "other").mkdir(parents=True)
     for curves, out, said in (
         (tmp_path / "nowhere", "o", f"\n--curves {tmp_path / 'nowhere'}: no such file or folder\n"),
         (bare, "o", "no wire in it (.csv, .vtp, .mrk.json, .vtk, .h5, .hdf5); found deeper/, notes.txt; give a folder"),
+        (
+            tmp_path / "text",
+            "o",
+            "no wire in it (.csv, .vtp, .mrk.json, .vtk, .h5, .hdf5); found w0.txt; give a folder",
+        ),
         (mixed, "o", ".csv and .vtp files"),
         (f"a={full}/*.vtk", "o", "it matches no file"),
         (f"a={tmp_path}/fu*", "o", "it matches a folder, full"),

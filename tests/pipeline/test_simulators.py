@@ -13,6 +13,7 @@ import pytest
 from numpy.typing import NDArray
 
 from pipeline.cli import main
+from pipeline.run.overall import found_cases, overall, ratio
 from pipeline.run.simulators import OF_SKILL, Piece, _rows, side_by_side, write_comparison
 from pipeline.run.stages import others
 from pipeline.run.stages.known import Known
@@ -22,7 +23,7 @@ from reports.doubts import AMONG, COUNT_AS, MADE_FROM_TRACES, Doubt
 from reports.run_page import render_index
 from reports.schema import ERRORS, FAILURES, POINTS, SIMULATORS, SUMMARY, WHERE
 from reports.simulators import _where, in_common, nearer, render_simulators
-from reports.verdict import verdict
+from reports.verdict import remarks, verdict
 
 pytestmark = pytest.mark.usefixtures("invented")
 Array = NDArray[np.float64]
@@ -175,6 +176,12 @@ def test_who_has_few_frames_takes_them_from_nobody(tmp_path: Path) -> None:
     assert list(ratios["common_frames"]) == [6, 6], "pairs are as they were"
 
 
+def test_without_a_frame_that_counts_none_are_in_common() -> None:
+    """It said "only 0 of 0 frames count for all simulators"."""
+    row = {"simulator": "one", "against": None, "frames_ok": 0, "common_frames": 0, "skill_strongest": None}
+    assert in_common(pd.DataFrame([row])) == ""
+
+
 def test_nothing_is_said_where_most_frames_count_for_all(compared: Path) -> None:
     assert in_common(tables.read(compared / "simulators.csv", SIMULATORS)) == ""
 
@@ -227,6 +234,47 @@ def test_who_has_its_tips_off_is_nearest_nowhere(tmp_path: Path) -> None:
     page = (tmp_path / "simulators.html").read_text(encoding="utf-8")
     assert "does not see: short (the tips lie off)." in page
     assert said[-1] == f"score of short, fair, wireval.  side by side: {tmp_path / 'simulators.html'}"
+
+
+def cut(whole: Path, to: Path, early_mm: float, frames: tuple[int, ...], back: float) -> Path:
+    """The same wires, in some frames cut short. back : how many times as far the traced wires are then from them."""
+    shutil.copytree(whole, to)
+    for case in (to / "cases").iterdir():
+        points, errors = (tables.read(case / of.file, of) for of in (POINTS, ERRORS))
+        errors["back_rms_mm"] = errors["rms_mm"]
+        tables.write(whole / "cases" / case.name / ERRORS.file, ERRORS, errors.to_dict("records"))
+        for n in frames:
+            mine = points["frame"] == n
+            points = points[~(mine & (points["arc_mm"] > points["arc_mm"][mine].max() - early_mm))]
+            left = points["error_mm"][points["frame"] == n]
+            errors.loc[n, ["rms_mm", "p95_mm"]] = np.sqrt(np.mean(left**2)), left.max()
+            errors.loc[n, "tip_mm"], errors.loc[n, "back_rms_mm"] = early_mm, back * errors["back_rms_mm"][n]
+        tables.write(case / POINTS.file, POINTS, points)
+        tables.write(case / ERRORS.file, ERRORS, errors.to_dict("records"))
+    return to
+
+
+def grown(tip: Array, _depth: Array, _rng: np.random.Generator) -> Array:
+    return 0.1 + 0.9 * np.clip((6.0 - tip) / 6.0, 0.0, 1.0)
+
+
+@pytest.mark.parametrize(("early_mm", "back"), [(0.8, 1.1), (1.95, 3.0)])
+def test_a_wire_that_ends_early_is_not_nearer_than_the_whole_one(tmp_path: Path, early_mm: float, back: float) -> None:
+    """Cut by 1.95 mm in the worst frames it was nearer, 1.13 to 2.73 times, led at the tip and was good, unwarned."""
+    whole = write_tree(tmp_path / "whole", grown)
+    early = cut(whole, tmp_path / "early", early_mm, (0, 2, 3), back)
+    said = write_comparison(tmp_path, {"whole": whole, "early": early})
+    table = pd.read_csv(tmp_path / "simulators.csv")
+    alone, pair = (table[table["against"] == "whole"] if n else table[table["against"].isna()] for n in (0, 1))
+    assert pair["rms_ratio_high"].item() < 1.0 < pair["back_ratio_low"].item()
+    assert not any(line.startswith("early is nearer") for line in said)
+    assert alone.set_index("simulator").loc["early", "tip_max_mm"] == early_mm
+    where = pd.read_csv(tmp_path / "where.csv").query("simulator == 'early' and along == 'distance from the tip'")
+    assert set(where["lead"].dropna()) <= {"tie", "the tips lie off"}
+    shown = render_simulators(tmp_path).read_text(encoding="utf-8")
+    assert shown.index(">whole<") < shown.index(">early<"), "in the table"
+    assert bool(remarks(overall(found_cases(early)))) == (back > 2.0)
+    assert "is better" not in ratio(found_cases(whole), found_cases(early)).verdict()  # type: ignore[union-attr]
 
 
 def test_report_makes_every_table_of_a_score_again(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

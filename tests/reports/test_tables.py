@@ -37,7 +37,7 @@ SUMMARY_HEADER = (
     "skill,skill_low,skill_high,skill_strongest,skill_strongest_low,skill_strongest_high,strongest_null,"
     "null_another_rms_mm,frame_spacing_mm,branch_ok_fraction,coverage,within_1mm,trace_mean_median_mm,"
     "trace_tip_median_mm,truth_rms_mm,max_penetration_mm,push_force_max_N,strongest_frames,frames_fitted,ends_rank,"
-    "strongest_insertions,warnings,skill_frames,"
+    "strongest_insertions,warnings,skill_frames,back_rms_mm,tip_max_mm,"
     "tip_along_median_mm,tip_across_median_mm,depth_offset_mm,side_ok,null_roll_unknown_rms_mm,null_no_tip_curve_rms_mm,"
     "null_pinned_rms_mm,null_neighbours_rms_mm,trace_sigma_mm,num_mm,u_input_mm,u_val_mm,share_beyond_2u,log_score_bits,"
     "energy_score_mm"

@@ -139,7 +139,7 @@ def test_a_wire_that_ends_elsewhere_is_not_called_better(along: float | None, sa
     assert badge("ok", True, row) == {"text": "the tips lie off", "look": "poor"}
     assert f"The wire {said} (median)" in verdict(row)
     assert ("rms_mm does not see that" in verdict(row)) is (along != 1.9), "what lies beyond the trace is seen"
-    assert ("judge by tip_median_mm, and by back_rms_mm of errors.csv" in verdict(row)) is (along != 1.9)
+    assert ("judge by tip_median_mm and back_rms_mm" in verdict(row)) is (along != 1.9)
     assert "The wire is better" not in verdict(row)
     assert badge("ok", True, row | {"tip_median_mm": 0.29})["look"] == "good"
     assert badge("ok", True, row | {"rms_mm": 0.7})["look"] == "good", "a tip is the worst of most wires"
@@ -152,6 +152,8 @@ def test_wires_that_fold_back_in_a_third_of_the_frames_are_not_called_better() -
     assert badge("ok", True, row) == {"text": "the tips lie off", "look": "poor"}
     assert "18 % of the traced wires have no simulated one near: rms_mm does not see that" in verdict(row)
     assert badge("ok", True, row | {"coverage": 0.99})["look"] == "good"
+    early = row | {"coverage": 0.96, "back_rms_mm": 0.47}
+    assert badge("ok", True, early)["look"] == "poor", "some end early, and neither median tip nor coverage shows it"
     assert badge("ok", True, row | {"p95_mm": 3.0})["look"] == "good", "rms_mm sees wires that lie beside the trace"
 
 

@@ -65,7 +65,7 @@ KEYS = {
     '`{files = ..., space = "RAS", unit = "mm"}` where the files do not state them.',
     "files": "The files, as `simulated` alone names them.",
     "space": "LPS or RAS, where the files do not state it.",
-    "unit": "mm, cm or m, where the files do not state it.",
+    "unit": "mm, um, cm, m or inch, where the files do not state it.",
     "uncertainty": "How well other inputs are known, below: what the budget draws from.",
     "lumen_mm": "Standard deviation of the lumen's surface, from place to place, mm.",
     "lumen_bias_mm": "The same, common to all of the surface, mm.",

@@ -124,7 +124,7 @@ def on_another_scale(frames: Sequence[Frame], depths_mm: Mapping[int, float]) ->
         return []
     (slope, _), covariance = np.polyfit(stated, traced - stated, 1, cov=True)
     deviation = float(np.sqrt(covariance[0, 0]))
-    if abs(slope) < max(LEAST_SCALE, float(stdtrit(len(known) - 2, 1.0 - CHANCE)) * deviation):
+    if abs(slope) < max(LEAST_SCALE, float(stdtrit(len(known) - 2, 1.0 - 0.5 * CHANCE)) * deviation):
         return []
     return [
         f"the traced wires grow {1.0 + slope:.3f} times as fast as insertion_mm states (standard deviation "

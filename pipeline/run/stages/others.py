@@ -100,6 +100,10 @@ def _taken(run: Context, known: Known, frame: Frame, file: OtherFile, *, others_
     deepest = float(_clearance(known, points).max()) + case.wire.radius_mm
     found = replace(frame, simulated=OtherWire(points, max(deepest, 0.0)))
     radius = case.wire.radius_mm
+    own, sentence, message = file.refused
+    if own and found.ok:  # as in the run that it comes from
+        said = f"{file.name}: {message or sentence}"
+        return replace(found, status=own, sentence=sentence, stage="simulate", message=said)
     found = not_in_itself(found, self_overlap_mm(points, radius), radius, f"{file.name}: the wire")
     length = float(arc_length(points)[-1])
     wrong = not_to_depth(length, frame.depth_mm, run.config.trace.length_tolerance_mm, file.unit, others_fit=others_fit)
