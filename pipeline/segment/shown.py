@@ -28,7 +28,7 @@ LEAST_NOISES = 2.0
 """Contrast over a voxel's noise below which a scan is not asked."""
 ROUNDS = 8
 OFF_VOXELS = 0.5
-"""From here on the lumen is off: the wall of `segment` is found to 0.15 voxel, a map's staircase to 0.3."""
+"""From here on the lumen is off: the wall of `segment` is found to 0.15 voxel, a right label map's to 0.3."""
 FAR_VOXELS = 2.0
 """From here on it is what frames fail by: traces are looked for within a voxel of the wall."""
 

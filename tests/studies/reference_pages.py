@@ -50,6 +50,7 @@ KEYS = {
     "insertion_mm": "Expected depths, one per frame; traces are held against them. Without frames: depths to simulate.",
     "spacing_mm": "Voxel size, for files that lack it. It is reported as assumed.",
     "lumen": "Own lumen instead of a segmented one: label map, .stl, .vtp, or centreline with radii (.swc, .mrk.json). "
+    "A label map tells the wall to 0.1 voxel, a surface better. "
     '`{file = "seg.nrrd", label = 2}` takes one label, by number or name. '
     "`{file = ..., level = 0.5}` takes a probability.",
     "traces": "Own or corrected centrelines instead of traced ones, one file per frame: .csv (x_mm, y_mm, z_mm, LPS "
