@@ -26,8 +26,8 @@ OVER_MM = 3.0
 PAIRED = 0.03
 """Median harmonic from which a line is two wires in contact all along: two have 0.031 and more (0.3 to 0.5 mm wires in
 voxels of 0.3 mm), one has 0.022 and less. Uneven voxels make a round wire oblong by 0.018 at 1.6 to 1."""
-MEDIAN = 1.18
-"""Median of a complex number's size over the standard deviation of its parts."""
+MEDIAN = 0.83
+"""Median of a complex number's size over its root mean square, where both parts are noise."""
 SURE = 2.0
 """Three standard deviations of the median of n independent ones, over that median, times the square root of n."""
 STRETCH_MM, STRETCHED, SURE_STRETCH = 10.0, 0.024, 3.0
@@ -87,8 +87,8 @@ class Section:
     """What the cross-section looks like along a curve of n points.
 
     harmonic : second, of the ring's grey (n,).     grey : on the axis, averaged over OVER_MM (n,).
-    step_mm : between points.     window : weights of that average.     noise : of ``oblong`` where the wire has its
-    usual height.
+    step_mm : between points.     window : weights of that average.     noise : root mean square that it makes of
+    ``oblong``, where the wire has its usual height.
     """
 
     harmonic: NDArray[np.complex128]

@@ -21,6 +21,7 @@ from pipeline.trace.config import TraceConfig
 from pipeline.trace.ends import sharpest_turn_deg
 from pipeline.trace.outside import seen_outside
 from pipeline.trace.reach import end_range
+from pipeline.trace.section import MEDIAN, places_around, read_around, section_along
 from pipeline.trace.steps import Steps
 from pipeline.trace.subtraction import CREST_VOXELS, subtracted
 from pipeline.trace.tube import Tube, spline_through, tint_nodes
@@ -425,6 +426,16 @@ def test_the_range_of_an_end_holds_the_true_one_and_is_as_narrow_as_noise_allows
     ranges = np.array([end_range(line_in_noise(seed, 3.0, 18.0), tube) for seed in range(60)])
     assert np.mean(ranges[:, 0] > 0.26) > 0.97, "three standard deviations, in steps of a quarter of a voxel"
     assert np.median(ranges.sum(axis=1)) < 2 * 1.3 * h, "1.06 / CNR voxel is the least standard deviation of an end"
+
+
+def test_how_far_noise_makes_a_round_line_out_of_round_is_known():
+    """It was taken for a half more: two wires in contact had to be so much further out of round to be seen."""
+    line, found = np.stack([np.full(90, 6.0), np.full(90, 6.0), np.linspace(3.0, 24.0, 90)], axis=1), []
+    for seed in range(12):
+        image = line_in_noise(seed, 30.0, 30.0)
+        section = section_along(image, line, read_around(image, places_around(line, 0.3)))
+        found.append(np.median(section.oblong) / section.noise)
+    assert np.mean(found) == pytest.approx(MEDIAN, rel=0.15), "7 independent values each; a ring has 12 that are not"
 
 
 def test_faint_wire_beyond_a_tip_stands_out_over_its_length_and_noise_does_not():
