@@ -1,5 +1,6 @@
 """Polylines: resampling, truncation and extension by arc length, tangents, units of their lengths."""
 
+import math
 import warnings
 
 import numpy as np
@@ -89,6 +90,22 @@ def across(directions: Array) -> Array:
     first = crossed(directions, np.eye(3)[np.argmin(np.abs(directions), axis=-1)])
     first /= np.maximum(np.linalg.norm(first, axis=-1, keepdims=True), 1e-12)
     return np.stack([first, crossed(directions, first)], axis=-2)
+
+
+def carried(tangents: Array, first: Array) -> Array:
+    """Unit vectors (n, 3) across unit tangents (n, 3), carried along from ``first`` (3,) without twist.
+
+    Parallel transport: from one to the next a vector loses what it has along the tangent, and nothing else.
+    """
+    x, y, z = first.tolist()
+    normals = []
+    for a, b, c in tangents.tolist():  # arrays of three numbers take five times as long
+        along = x * a + y * b + z * c
+        x, y, z = x - along * a, y - along * b, z - along * c
+        size = max(math.sqrt(x * x + y * y + z * z), 1e-9)
+        x, y, z = x / size, y / size, z / size
+        normals.append((x, y, z))
+    return np.array(normals)
 
 
 def turns_deg(curve_mm: Array, apart: int) -> Array:

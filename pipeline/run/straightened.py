@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.ndimage import map_coordinates
 
-from pipeline.arrays.polyline import at_arc, tangents
+from pipeline.arrays.polyline import at_arc, carried, tangents
 from pipeline.model import Array, Volume, arc_length
 from pipeline.run.projections import shades
 from reports.frames_file import Straightened
@@ -24,7 +24,7 @@ def straightened(volume: Volume, curve_mm: Array, window: tuple[float, float]) -
     along = max(across, length / MOST_PLANES)
     arc = np.arange(0.0, length, along)
     heading = tangents(curve_mm, arc, _AHEAD_MM)
-    first = _carried(heading)
+    first = carried(heading, np.eye(3)[np.argmin(np.abs(heading[0]))])
     second = np.cross(heading, first)
     offsets = across * (np.arange(ACROSS) - ACROSS // 2)
     # every plane's points: (planes, samples along the first direction, along the second, 3)
@@ -32,17 +32,3 @@ def straightened(volume: Volume, curve_mm: Array, window: tuple[float, float]) -
     index = volume.to_index(at_arc(curve_mm, arc)[:, None, None] + planes)
     values = map_coordinates(volume.values, np.moveaxis(index, -1, 0), np.float32, order=1, cval=window[0])
     return Straightened(shades(values, window), along, across, first[0])
-
-
-def _unit(vectors: Array) -> Array:
-    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-9))
-
-
-def _carried(tangents: Array) -> Array:
-    """A unit vector across each tangent (n, 3), carried along the curve without twist (parallel transport)."""
-    normals = np.zeros_like(tangents)
-    normal: Array = np.eye(3)[np.argmin(np.abs(tangents[0]))]
-    for i, tangent in enumerate(tangents):
-        normal = _unit(normal - (normal @ tangent) * tangent)
-        normals[i] = normal
-    return normals

@@ -5,16 +5,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import cKDTree
 
+from pipeline.arrays.polyline import turns_deg
 from pipeline.model import Array, Curve, arc_length
 from pipeline.trace.crests import BEND, Tracklet, find_crests
 from pipeline.trace.knots import CLOSEST, FIRST_BLUR, first_tube
-from pipeline.trace.link import Path, link, resampled, with_doubles
+from pipeline.trace.link import Path, first_ahead, link, resampled, with_doubles
 from pipeline.trace.onward import beyond
 from pipeline.trace.profile import LEAST_LEVEL, ended
 from pipeline.trace.stated import Opacity, ended_as_stated
 from pipeline.trace.steps import EVEN
 from pipeline.trace.subtraction import Subtraction, numbered
-from pipeline.trace.tube import Tube, fit_tube, predicted
+from pipeline.trace.tube import Tube, fit_tube, predicted, weights
 
 ENTRY_REACH_MM = 4.0
 """How far from the manifest's entry the wire may pass."""
@@ -28,6 +29,8 @@ WIDE_KNOTS = 1.4
 cost a fourth of the time."""
 BENDS_SURE = 4.0
 """Standard deviations by which closer knots must save more than they do by chance."""
+MOST_SHARP_DEG = 60.0
+"""Angle within a voxel beyond which a fit has folded: right curves turn by up to 27 (a J tip), folds by 60 to 170."""
 NEAR_VOXELS = 2.5
 """Crests nearer than this to the curve belong to it."""
 
@@ -52,7 +55,7 @@ class Attempt:
     pieces : all crests that were seen; known : points (n, 3) that count as explained besides the tube's.
     behind_mm : length of the line before the path's first point, outside the entry.  goes_on : whether something faint
     is seen past its tip.  confirmed : whether the manifest states a length.  short : whether it is hardly any of that
-    length.  late_mm : wire missing at the entry.
+    length.  agrees : whether it is that length.  late_mm : wire missing at the entry.
     """
 
     tube: Tube
@@ -65,6 +68,7 @@ class Attempt:
     goes_on: bool = False
     confirmed: bool = False
     short: bool = False
+    agrees: bool = False
     late_mm: float = 0.0
 
     @property
@@ -112,6 +116,12 @@ def dense(tube: Tube, step: float) -> Array:
     return tube.at(np.linspace(0, tube.intervals, max(3, round(tube.length_mm / step) + 1)))
 
 
+def sharpest_deg(image: Subtraction, tube: Tube) -> float:
+    """Largest angle by which the tube's curve turns within a voxel."""
+    line = resampled(dense(tube, 0.1 * image.voxel), 0.5 * image.voxel)
+    return float(turns_deg(line, 2).max(initial=0.0))
+
+
 def _off(image: Subtraction, tube: Tube, pieces: list[Tracklet], known: Array) -> list[tuple[Array, float]]:
     """What of the pieces lies off the tube and off ``known`` points (n, 3): points (m, 3) and length (mm) of each.
 
@@ -144,6 +154,19 @@ def _attempt(
     return Attempt(tube, path, _off(image, tube, pieces, known), pieces, known, behind_mm=behind_mm)
 
 
+def _left_beyond(image: Subtraction, attempt: Attempt, tube: Tube) -> bool:
+    """Whether a tube fitted along what goes on beyond an attempt's tip has left it there.
+
+    One that is hardly longer has not where nothing is left beyond its own tip: the attempt had missed the end by a
+    voxel or two, and the rest of it looked like another line.
+    """
+    more = tube.length_mm - attempt.tube.length_mm
+    if more > 3.0 * image.voxel:
+        return False
+    path, stray = beyond(image, tube, dense(tube, 0.5 * image.voxel), attempt.known)
+    return more <= 0.0 or path is not None or stray
+
+
 def prolonged(image: Subtraction, attempt: Attempt, entry: EntryPose) -> Attempt | None:
     """The attempt with what goes on beyond its tip; None where nothing does.
 
@@ -158,7 +181,7 @@ def prolonged(image: Subtraction, attempt: Attempt, entry: EntryPose) -> Attempt
         found = again(image, attempt, entry) if len(attempt.tube.steps.edges) else attempt
         return found if found.tube.length_mm > attempt.tube.length_mm + image.voxel else None
     tube = _fitted(image, path.points, attempt.cut, entry)
-    if tube is None or tube.length_mm < attempt.tube.length_mm + 3.0 * image.voxel:
+    if tube is None or _left_beyond(image, attempt, tube):
         return replace(attempt, goes_on=True)
     gaps = attempt.path.points[attempt.path.bridged]
     points = np.concatenate([gaps, path.points])
@@ -244,8 +267,7 @@ def warm(image: Subtraction, entry: EntryPose, previous: Curve, crests_voxel: fl
     path = Path(line, np.zeros(len(line), bool), 0)
     onward = link(rest, line[-1], heading / np.linalg.norm(heading), gap_mm, 5.0 * h)
     if onward is not None:
-        ahead = (onward.points - line[-1]) @ heading > 0
-        first = int(np.argmax(ahead)) if ahead.any() else len(ahead)
+        first = first_ahead(onward.points, line[-1], heading)
         points = np.concatenate([line, onward.points[first:]])
         path = Path(points, np.concatenate([path.bridged, onward.bridged[first:]]), onward.bridges)
     found = _attempt(image, path, entry, rest, np.zeros((0, 3)))
@@ -253,15 +275,19 @@ def warm(image: Subtraction, entry: EntryPose, previous: Curve, crests_voxel: fl
 
 
 def misfit(image: Subtraction, attempts: list[Attempt]) -> list[float]:
-    """Sum of squares of what each attempt leaves, over the voxels that any of them claims, in noise variances."""
+    """Sum of squares of what each attempt leaves, over the voxels that any of them claims, in noise variances.
+
+    Those before one's start plane count for none: else the attempt that reaches further out of the entry wins.
+    """
     radius = 3.0 * max(a.tube.sigma for a in attempts)
     curve = np.concatenate([dense(a.tube, image.voxel) for a in attempts])
     out = []
     with numbered(image, curve, radius) as (voxels, slot):
+        weight = np.prod([weights(image, a.tube, voxels) for a in attempts], axis=0)
         for attempt in attempts:
             left = image.grey.reshape(-1)[voxels].astype(float)
             own, model = predicted(image, attempt.tube)
             at = slot.reshape(-1)[own] - 1
             left[at[at >= 0]] -= model[at >= 0]
-            out.append(float(np.sum(left**2)) / image.noise**2)
+            out.append(float(weight @ left**2) / image.noise**2)
     return out

@@ -11,6 +11,7 @@ from pipeline.model import Array, Curve
 from pipeline.status import FrameStatus
 from pipeline.trace.ahead import WASHED, washed_out
 from pipeline.trace.attempt import ENTRY_REACH_MM, Attempt, dense
+from pipeline.trace.ends import named
 from pipeline.trace.onward import FAINTEST, GOES_ON, TANGENT_MM
 from pipeline.trace.subtraction import CREST_VOXELS, Subtraction
 from pipeline.trace.tube import Tube
@@ -80,18 +81,22 @@ def faint_for_its_noise(curve: Curve) -> Curve:
     return replace(curve, status=FrameStatus.TRACE_LOW_CONTRAST, note=note)
 
 
-def ends_in_nothing(image: Subtraction, tube: Tube, curve: Curve) -> Curve:
+def ends_in_nothing(image: Subtraction, attempt: Attempt, curve: Curve) -> Curve:
     """The curve, or the same as ambiguous where something beyond its tip is too bright, over its length, for noise.
 
-    With FAINT_BEYOND among its levels where that is sure, but no brighter than streaks of the wire are.
+    Not where the tip's depth is the stated one: a wall that is off by a few hundredths of its contrast, as beside the
+    stairs of a label map, is a line of 10 standard deviations, too.  With FAINT_BEYOND among its levels where that is
+    sure, but no brighter than streaks of the wire are.
     """
     if curve.status is not FrameStatus.OK:
         return curve
+    tube = attempt.tube
     left = tube.sigma**2 / (tube.sigma**2 + (CREST_VOXELS * image.voxel) ** 2)
     least, faint = FAINTEST * tube.peak * min(1.0, left / BLURRED), STREAK * tube.peak * left
     ways = _beyond(image, tube, least, faint)
-    if not image.correlated and highest(ways, least) > SURE:
-        got, allowed = f"a faint line {GOES_ON}", "a tip with nothing beyond it"
+    if not image.correlated and not attempt.agrees and highest(ways, least) > SURE:
+        tip = named(image, dense(tube, image.voxel)[-1])
+        got, allowed = f"a faint line {GOES_ON}, from {tip} mm on", "a tip with nothing beyond it"
         do = "look whether the wire's end is fainter than the rest; scan with more dose"
         return replace(curve, status=FrameStatus.TRACE_AMBIGUOUS, note=note_of(got, allowed, do))
     if highest(ways, faint) > STREAK_SURE:
@@ -129,7 +134,7 @@ def not_washed_out(image: Subtraction, tube: Tube, curve: Curve) -> Curve:
 def doubted(image: Subtraction, attempt: Attempt, curve: Curve) -> Curve:
     """The curve of an attempt with the first of all doubts, if there is any, as its status."""
     curve = with_marks(image, attempt.tube, curve)  # for the other frames, whatever becomes of this one
-    curve = ends_in_nothing(image, attempt.tube, faint_for_its_noise(curve))
+    curve = ends_in_nothing(image, attempt, faint_for_its_noise(curve))
     if curve.status is not FrameStatus.OK or attempt.confirmed:  # a stated depth says where the wire ends
         return curve
     read = along_line(image, attempt.tube)

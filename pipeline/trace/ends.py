@@ -8,7 +8,7 @@ from pipeline.arrays.polyline import turns_deg
 from pipeline.model import Array
 from pipeline.status import FrameStatus
 from pipeline.trace.ahead import dark_ahead, hidden_ahead
-from pipeline.trace.attempt import Attempt
+from pipeline.trace.attempt import MOST_SHARP_DEG, Attempt, sharpest_deg
 from pipeline.trace.config import MOST_APART
 from pipeline.trace.onward import GOES_ON
 from pipeline.trace.outside import seen_outside, thread_outside
@@ -62,7 +62,7 @@ def sharpest_turn_deg(points: Array, step: float, reach: float) -> float:
     return float(turns_deg(points, max(1, round(reach / max(step, 1e-9)))).max(initial=0.0))
 
 
-def _named(image: Subtraction, point: Array) -> str:
+def named(image: Subtraction, point: Array) -> str:
     """A place in LPS mm, for a message."""
     return ", ".join(f"{x:.1f}" for x in image.world(point[None])[0])
 
@@ -139,7 +139,7 @@ def of_the_ends(
          f"{LATE_MM + LATE_VOXELS * image.voxel:.1f} mm at most",
          "look whether the wire is hidden there, or move entry_mm to where it begins"),
         (attempt.goes_on, FrameStatus.TRACE_AMBIGUOUS,
-         f"a line {GOES_ON}", "a tip with nothing beyond it",
+         f"a line {GOES_ON}, from {named(image, points[-1])} mm on", "a tip with nothing beyond it",
          "look whether the wire's end is fainter than the rest"),
         (folded and not attempt.from_previous, FrameStatus.TRACE_AMBIGUOUS,
          "a tip beside another strand of the wire", f"{TIP_BESIDE} voxels between them",
@@ -152,15 +152,15 @@ def of_the_lumen(image: Subtraction, attempt: Attempt, points: Array) -> tuple[O
     beyond_wall = float(image.depth_at(points[-1:])[0]) / image.voxel
     return (
         (seen_outside(image, points), FrameStatus.TRACE_LEFT_LUMEN,
-         f"a lumen that ends at {_named(image, points[-1])} mm, and something bright beyond it",
+         f"a lumen that ends at {named(image, points[-1])} mm, and something bright beyond it",
          "a lumen that holds the tip",
          "look whether the vessel goes on there (segment.threshold, lumen), or bone touches it"),
         (beyond_wall > ENDS_OUTSIDE_VOXELS, FrameStatus.TRACE_LEFT_LUMEN,
-         f"a curve that ends {beyond_wall * image.voxel:.1f} mm outside the lumen, at {_named(image, points[-1])} mm, "
+         f"a curve that ends {beyond_wall * image.voxel:.1f} mm outside the lumen, at {named(image, points[-1])} mm, "
          "where no more of the scan is read", f"{ENDS_OUTSIDE_VOXELS * image.voxel:.1f} mm at most",
          "look whether the wire leaves the vessel there, or the vessel goes on (segment.threshold, lumen)"),
         (thread_outside(image, points, attempt.tube.sigma), FrameStatus.TRACE_LEFT_LUMEN,
-         f"a line as thin and as bright as the wire that leads on through tissue from {_named(image, points[-1])} mm, "
+         f"a line as thin and as bright as the wire that leads on through tissue from {named(image, points[-1])} mm, "
          "where the curve ends", "a lumen that holds the tip",
          "look whether the wire leaves the vessel there; if that is a thin vessel, give a reference scan "
          "without wire, or one with less noise"),
@@ -229,12 +229,16 @@ def _haloed(image: Subtraction, tube: Tube) -> bool:
 def of_the_whole(image: Subtraction, attempt: Attempt, points: Array, length_mm: float) -> tuple[Objection, ...]:
     """Why a curve (n, 3) may be no wire, or not one."""
     step = length_mm / max(1, len(points) - 1)
+    sharpest = sharpest_deg(image, attempt.tube)
     turn = sharpest_turn_deg(points[: -max(1, round(J_MM / max(step, 1e-9)))], step, HAIRPIN_VOXELS * image.voxel)
     return (
         (image.edges_mm[0] / image.edges_mm[1] >= MOST_APART, FrameStatus.TRACE_AMBIGUOUS,
          "slices of {:.3g} mm and pixels of {:.3g} mm".format(*image.edges_mm),
          f"less than {MOST_APART:g} times as far apart",
          "reconstruct thinner slices: in these a wire and its ends are off by more than its uncertainty says"),
+        (sharpest > MOST_SHARP_DEG, FrameStatus.TRACE_AMBIGUOUS,
+         f"a curve that turns by {sharpest:.0f} degrees within a voxel", f"{MOST_SHARP_DEG:g} at most",
+         "look where it doubles back; list a frame of a nearer depth before it, or give its curve (traces)"),
         (_haloed(image, attempt.tube), FrameStatus.TRACE_AMBIGUOUS,
          f"a sharp line in a halo of {attempt.tube.offset / max(attempt.tube.peak, 1e-9):.2f} of its brightness",
          f"{HALO:g} at most", "look whether the wire moved during the scan, or another one lies beside it: scan again"),

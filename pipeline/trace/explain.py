@@ -12,6 +12,7 @@ from pipeline.model import Array, Curve, arc_length
 from pipeline.status import FrameStatus
 from pipeline.trace.attempt import (
     ENTRY_REACH_MM,
+    MOST_SHARP_DEG,
     Attempt,
     EntryPose,
     again,
@@ -21,6 +22,7 @@ from pipeline.trace.attempt import (
     dense,
     misfit,
     prolonged,
+    sharpest_deg,
     warm,
 )
 from pipeline.trace.config import TraceConfig
@@ -53,6 +55,8 @@ BLUNT_TIP = 0.2
 0.9 mm wires was 2 times too small)."""
 TIPS_MM = 1.5
 """Most that two fits of one wire, before and after its background is told from it, may end apart."""
+AGREES_MM = 1.0
+"""How near a stated depth a length confirms it: twice the standard deviation that a depth has by default."""
 BRIDGE_SIGMA_VOXELS = 0.5
 """Standard deviation across the wire that a point on a bridged gap gets at least."""
 
@@ -106,7 +110,9 @@ def _read_off(image: Subtraction, attempt: Attempt | None, entry: EntryPose) -> 
     length = float(arc_length(image.world(points))[-1])
     late = float((points[0] - entry.point) @ entry.direction)
     stated = entry.expected_mm
-    attempt = replace(attempt, confirmed=stated is not None, short=hardly_begun(length, stated), late_mm=late)
+    agrees = stated is not None and abs(length - stated) < AGREES_MM
+    short = hardly_begun(length, stated)
+    attempt = replace(attempt, confirmed=stated is not None, short=short, agrees=agrees, late_mm=late)
     verdict = judge(image, attempt, points, _on_bridges(points, attempt, image.voxel), length)
     return [Candidate(attempt, points, *point_sigmas(attempt.tube, u), length, verdict)]
 
@@ -141,8 +147,10 @@ def _doubtful(image: Subtraction, found: list[Candidate], entry: EntryPose, conf
 def _best(image: Subtraction, found: list[Candidate], entry: EntryPose, config: TraceConfig) -> Candidate:
     """The candidate that leaves least unexplained: misfit, with a length far from the expected one held against it.
 
-    A millimetre missing or too much costs half of what a millimetre of wire explains, a flagged one a tenth.
+    A millimetre missing or too much costs half of what a millimetre of wire explains, a flagged one a tenth. A fit that
+    has folded explains more than it should: it counts where there is no other.
     """
+    found = [c for c in found if sharpest_deg(image, c.attempt.tube) < MOST_SHARP_DEG] or found
     if len(found) == 1:
         return found[0]
     costs = np.array(misfit(image, [c.attempt for c in found]))

@@ -101,6 +101,12 @@ def hermite(p: Array, tp: Array, q: Array, tq: Array, step: float) -> Array:
     )
 
 
+def first_ahead(points: Array, end: Array, heading: Array) -> int:
+    """The first of points (n, 3) that lies ahead of an end with that heading; n for none: a joint may not run back."""
+    ahead = (points - end) @ heading > 0.0
+    return int(np.argmax(ahead)) if ahead.any() else len(points)
+
+
 def _ends_at_entry(pieces: list[Tracklet], entry: Array, direction: Array, reach: float) -> list[int]:
     """The ends, numbered as in :func:`_ends`, to which tracklets lead in the wire's direction, nearest the entry first.
 
@@ -158,9 +164,11 @@ def link(pieces: list[Tracklet], entry: Array, direction: Array, longest: float,
     follow = [pieces[end // 2] if end % 2 else pieces[end // 2].reversed() for end in chain]
     points, bridged = [follow[0].points], [np.zeros(len(follow[0].points), bool)]
     for piece, after in pairwise(follow):
-        gap = hermite(piece.points[-1], piece.tangents[-1], after.points[0], after.tangents[0], BRIDGE_STEP_MM)
-        points += [gap, after.points]
-        bridged += [np.ones(len(gap), bool), np.zeros(len(after.points), bool)]
+        end, heading = piece.points[-1], piece.tangents[-1]
+        first = min(first_ahead(after.points, end, heading), len(after.points) - 1)  # pieces may overlap at their ends
+        gap = hermite(end, heading, after.points[first], after.tangents[first], BRIDGE_STEP_MM)
+        points += [gap, after.points[first:]]
+        bridged += [np.ones(len(gap), bool), np.zeros(len(after.points) - first, bool)]
     return Path(np.concatenate(points), np.concatenate(bridged), len(follow) - 1)
 
 

@@ -4,13 +4,13 @@ The second harmonic of grey on a ring about the axis is nothing for a round wire
 for two that are 2.7 voxels apart; in contact it is 0.06, twice as bright.
 """
 
-import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.arrays.polyline import across, carried, crossed
 from pipeline.model import Array
 from pipeline.trace.profile import INDEPENDENT_VOXELS
 from pipeline.trace.subtraction import CREST_VOXELS, Subtraction
@@ -26,8 +26,8 @@ OVER_MM = 3.0
 PAIRED = 0.03
 """Median harmonic from which a line is two wires in contact all along: two have 0.031 and more (0.3 to 0.5 mm wires in
 voxels of 0.3 mm), one has 0.022 and less. Uneven voxels make a round wire oblong by 0.018 at 1.6 to 1."""
-MEDIAN = 1.18
-"""Median of a complex number's size over the standard deviation of its parts."""
+MEDIAN = 0.83
+"""Median of a complex number's size over its root mean square, where both parts are noise."""
 SURE = 2.0
 """Three standard deviations of the median of n independent ones, over that median, times the square root of n."""
 STRETCH_MM, STRETCHED, SURE_STRETCH = 10.0, 0.024, 3.0
@@ -48,18 +48,10 @@ TWISTS, SURE_TWISTED = (-0.2, -0.15, -0.1, -0.05, 0.05, 0.1, 0.15, 0.2), 2.7
 stays in phase: pitches from 4.5 mm up. Four standard deviations, as the largest of several is taken."""
 
 
-def carried(tangents: Array) -> tuple[Array, Array]:
+def _normals(tangents: Array) -> tuple[Array, Array]:
     """Two unit normals (n, 3) each, along a curve with these unit tangents (n, 3), that twist as little as possible."""
-    x, y, z = np.cross(tangents[0], np.eye(3)[int(np.argmin(np.abs(tangents[0])))]).tolist()
-    normals = []
-    for a, b, c in tangents.tolist():  # arrays of three numbers take five times as long
-        along = x * a + y * b + z * c
-        x, y, z = x - along * a, y - along * b, z - along * c
-        size = math.sqrt(x * x + y * y + z * z)
-        x, y, z = x / size, y / size, z / size
-        normals.append((x, y, z))
-    first = np.array(normals)
-    return first, np.cross(tangents, first)
+    first = carried(tangents, across(tangents[0])[0])
+    return first, crossed(tangents, first)
 
 
 def _directions(points: Array) -> Array:
@@ -70,7 +62,7 @@ def _directions(points: Array) -> Array:
 
 def _ring(points: Array, radius: float) -> Array:
     """Points (ANGLES, n, 3) on a ring about each point of a curve (n, 3)."""
-    u, v = carried(_directions(points))
+    u, v = _normals(_directions(points))
     return points + radius * (np.cos(PHI)[:, None, None] * u + np.sin(PHI)[:, None, None] * v)
 
 
@@ -95,8 +87,8 @@ class Section:
     """What the cross-section looks like along a curve of n points.
 
     harmonic : second, of the ring's grey (n,).     grey : on the axis, averaged over OVER_MM (n,).
-    step_mm : between points.     window : weights of that average.     noise : of ``oblong`` where the wire has its
-    usual height.
+    step_mm : between points.     window : weights of that average.     noise : root mean square that it makes of
+    ``oblong``, where the wire has its usual height.
     """
 
     harmonic: NDArray[np.complex128]
@@ -183,7 +175,7 @@ def as_sharp(image: Subtraction, points: Array, sigma: float, blur: Array) -> ND
     blur : of ``blur_by_axis``.  One whose square is larger by D across the wire makes exp(-x^2 / 2 s^2) larger by
     x^2 D / 2 s^4.
     """
-    u, v = carried(_directions(points))
+    u, v = _normals(_directions(points))
     seen, radius = sigma**2 + (CREST_VOXELS * image.voxel) ** 2, RING_BLURS * sigma
     usual = np.exp(-0.5 * radius**2 / seen) * radius**2 / (4.0 * seen**2)
     return np.asarray(usual * (u + 1j * v) ** 2 @ blur)
@@ -194,7 +186,7 @@ def _of_the_scanner(harmonic: NDArray[np.complex128], grey: Array, points: Array
 
     Scanners are as sharp along their axis as across it to 10 or 20 %, which makes every round wire as oblong as two.
     """
-    u, v = carried(_directions(points))
+    u, v = _normals(_directions(points))
     shapes = (u + 1j * v).T ** 2 * grey
     design = np.concatenate([shapes.real, shapes.imag], axis=1).T
     blur = np.linalg.lstsq(design, np.concatenate([harmonic.real, harmonic.imag]), rcond=None)[0]

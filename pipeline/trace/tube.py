@@ -173,7 +173,7 @@ def _prior(tube: Tube, image: Subtraction) -> Array:
     return np.asarray(np.kron(block, np.eye(3)))
 
 
-def _weights(image: Subtraction, tube: Tube, voxels: NDArray[np.int64]) -> Array:
+def weights(image: Subtraction, tube: Tube, voxels: NDArray[np.int64]) -> Array:
     """Weights (n,) of the voxels near the tube: none at its start for those that lie before its start plane."""
     if tube.start_plane is None:
         return np.ones(len(voxels))
@@ -188,7 +188,7 @@ def _equations(image: Subtraction, tube: Tube, samples: Samples, prior: Array) -
     """One set of normal equations, with the prior, the voxels that they are of, and the tube at its samples."""
     line, blob, k = sampled(tube, samples), tube.blob(image.voxel), len(tube.controls)
     with numbered(image, line.curve, blob.radius) as (voxels, slot):
-        claim = Claim(voxels, slot, _weights(image, tube, voxels))
+        claim = Claim(voxels, slot, weights(image, tube, voxels))
         e = kernels.normal_equations(image.grey, image.spacing, claim, line, blob, k, len(tube.tint))
     e.right[: 3 * k] -= prior @ tube.controls.ravel()
     e.normal[: 3 * k, : 3 * k] += prior

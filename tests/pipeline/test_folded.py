@@ -32,6 +32,5 @@ def test_a_tip_beside_the_wire_is_not_left_out_in_silence(seed: int, length_mm: 
     scene = folded(seed, length_mm, beside_mm)
     lumen = segment(scene.reference, scene.entry[None])
     curve = trace(scene.frame, lumen, scene.entry, scene.direction, reference=scene.reference)
-    assert scene.wire is not None
-    off = float(np.linalg.norm(curve.points_mm[-1] - scene.wire[-1])) / VOXEL
-    assert curve.status is FrameStatus.TRACE_AMBIGUOUS or off < 1.5, f"{off:.1f} voxels off, and ok"
+    assert curve.status is FrameStatus.TRACE_AMBIGUOUS
+    assert "out of round" in curve.note

@@ -305,6 +305,28 @@ def test_an_entry_lies_in_the_vessel_that_the_reference_shows(medium: float, beg
     assert direction[0] > 0.99
 
 
+@pytest.mark.parametrize("zero", [0, -1000, 3000, 10000, -5000])
+def test_the_entry_does_not_depend_on_where_grey_has_its_zero(zero: int) -> None:
+    """At 3000 the whole scan was the wire, at -5000 there was none."""
+    values = np.zeros((24, 24, 24))
+    values[6:18, 6:18] = 250
+    values[11:13, 11:13, :16] = 3000
+    noise = np.random.default_rng(1).normal(0.0, 20.0, values.shape)
+    frame = Volume((values + noise + zero).astype(np.float32), np.full(3, 0.4))
+    entry, direction, _ = infer_entry(frame, None, Path("f.mha"))
+    assert np.abs(entry - [4.6, 4.6, 0.0]).max() < 0.5
+    assert direction[2] > 0.95
+
+
+def test_an_entry_in_fine_voxels_needs_no_square_of_their_number(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A filled vessel in voxels of 0.07 mm ended in a MemoryError: 3 GB for three directions."""
+    asked: list[bool] = []
+    svd = np.linalg.svd
+    monkeypatch.setattr(np.linalg, "svd", lambda a, full_matrices=True: asked.append(full_matrices) or svd(a, False))
+    infer_entry(Volume(np.pad(np.ones((3, 3, 9)), 4), np.ones(3)), None, Path("f.mha"))
+    assert asked == [False]
+
+
 @pytest.mark.parametrize(("size", "origin_mm", "said"), [(12, 0.3, "the shapes differ"), (16, 1.0, "voxels apart")])
 def test_a_reference_on_another_grid_is_told_before_it_is_subtracted(
     tmp_path: Path, size: int, origin_mm: float, said: str

@@ -10,6 +10,7 @@ import pytest
 from scipy import ndimage
 from scipy.special import expit, ndtr
 
+from pipeline.arrays.polyline import across, carried
 from pipeline.arrays.spare import Spare
 from pipeline.model import Volume
 from pipeline.segment import segment
@@ -20,7 +21,7 @@ from pipeline.trace.config import TraceConfig
 from pipeline.trace.ends import sharpest_turn_deg
 from pipeline.trace.outside import seen_outside
 from pipeline.trace.reach import end_range
-from pipeline.trace.section import carried
+from pipeline.trace.section import MEDIAN, places_around, read_around, section_along
 from pipeline.trace.steps import Steps
 from pipeline.trace.subtraction import CREST_VOXELS, subtracted
 from pipeline.trace.tube import Tube, spline_through, tint_nodes
@@ -75,7 +76,9 @@ def test_a_marker_at_the_tip_is_seen_in_noise_beyond_what_is_not(seed: int, cnr:
     scene = draft.scan(cnr)
     lumen = segment(scene.reference, scene.entry[None])
     curve = trace(scene.frame, lumen, scene.entry, scene.direction, reference=scene.reference)
-    assert curve.status is not FrameStatus.OK or abs(curve.length_mm - arc_of(scene.wire)[-1]) < 1.0
+    assert curve.status is FrameStatus.TRACE_AMBIGUOUS
+    right = abs(curve.length_mm - arc_of(scene.wire)[-1]) < 1.0
+    assert ("beyond a gap" if right else "beyond") in curve.note
 
 
 @pytest.mark.parametrize("other", [True, False])
@@ -152,7 +155,8 @@ def test_two_wires_turned_about_each_other_are_not_one(voxels, pitch_mm):
     draft = Draft(np.random.default_rng(3), radius=2.2, wire_radius=0.18, room=0.9)
     tangents = np.gradient(draft.path, axis=0)
     tangents /= np.linalg.norm(tangents, axis=1)[:, None]
-    one, two = carried(tangents)
+    one = carried(tangents, across(tangents[0])[0])
+    two = np.cross(tangents, one)
     phase = 2.0 * np.pi * arc_of(draft.path)[:, None] / pitch_mm
     other = draft.path + 0.3 * voxels * (np.cos(phase) * one + np.sin(phase) * two)
     draft.others = [(other, 0.18, 1.0)]
@@ -229,8 +233,7 @@ def test_a_wire_that_leaves_the_lumen_through_its_wall_is_not_cut_there(leaves_m
         scene = leaving(seed, leaves_mm, angle_deg).scan(16)
         lumen = segment(scene.reference, scene.entry[None])
         curve = trace(scene.frame, lumen, scene.entry, scene.direction, reference=scene.reference)
-        short = np.linalg.norm(curve.points_mm[-1] - scene.wire[-1]) if len(curve.points_mm) else np.inf
-        assert curve.status is not FrameStatus.OK or short < 1.5 * scene.voxel
+        assert curve.status is FrameStatus.TRACE_LEFT_LUMEN
 
 
 @pytest.mark.parametrize("seed", [0, *later(1)])
@@ -423,6 +426,16 @@ def test_the_range_of_an_end_holds_the_true_one_and_is_as_narrow_as_noise_allows
     ranges = np.array([end_range(line_in_noise(seed, 3.0, 18.0), tube) for seed in range(60)])
     assert np.mean(ranges[:, 0] > 0.26) > 0.97, "three standard deviations, in steps of a quarter of a voxel"
     assert np.median(ranges.sum(axis=1)) < 2 * 1.3 * h, "1.06 / CNR voxel is the least standard deviation of an end"
+
+
+def test_how_far_noise_makes_a_round_line_out_of_round_is_known():
+    """It was taken for a half more: two wires in contact had to be so much further out of round to be seen."""
+    line, found = np.stack([np.full(90, 6.0), np.full(90, 6.0), np.linspace(3.0, 24.0, 90)], axis=1), []
+    for seed in range(12):
+        image = line_in_noise(seed, 30.0, 30.0)
+        section = section_along(image, line, read_around(image, places_around(line, 0.3)))
+        found.append(np.median(section.oblong) / section.noise)
+    assert np.mean(found) == pytest.approx(MEDIAN, rel=0.15), "7 independent values each; a ring has 12 that are not"
 
 
 def test_faint_wire_beyond_a_tip_stands_out_over_its_length_and_noise_does_not():

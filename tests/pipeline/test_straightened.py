@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from pipeline.arrays.polyline import carried
 from pipeline.model import Volume
 from pipeline.run.straightened import ACROSS, MOST_PLANES, straightened
 
@@ -43,6 +44,19 @@ def test_the_wire_is_in_the_middle_and_neighbours_are_where_they_are(direction: 
     assert means[off, 0] > 150
     assert 70 < means[0, -off] < 130
     assert max(means[-off, 0], means[0, off]) < 10
+
+
+def test_normals_are_carried_without_twist() -> None:
+    """On a circle the one across its plane stays; on a helix one turns back about the tangent by its torsion."""
+    z, turn = np.array([0.0, 0.0, 1.0]), np.linspace(0.0, 4.0 * np.pi, 4001)
+    circle = np.stack([-np.sin(turn), np.cos(turn), 0.0 * turn], axis=1)
+    np.testing.assert_allclose(carried(circle, z), np.tile(z, (len(turn), 1)), rtol=0.0, atol=1e-12)
+    helix = 0.8 * circle + 0.6 * z
+    inwards = np.stack([-np.cos(turn), -np.sin(turn), 0.0 * turn], axis=1)
+    normals = carried(helix, inwards[0])
+    np.testing.assert_allclose(np.sum(normals * helix, axis=1), 0.0, rtol=0.0, atol=1e-12)
+    # torsion over the angle of the turn is 0.6, the sine of the pitch; its error goes with the step, 0.003
+    np.testing.assert_allclose(np.sum(normals * inwards, axis=1), np.cos(0.6 * turn), rtol=0.0, atol=1e-3)
 
 
 def test_a_long_wire_has_no_more_planes_and_what_is_outside_is_dark() -> None:

@@ -48,6 +48,13 @@ def test_a_path_goes_on_over_a_gap_whichever_way_its_pieces_run(turned):
     np.testing.assert_allclose(path.points[:, :2], 0.0, rtol=0.0, atol=1e-12)
 
 
+@pytest.mark.parametrize("overlap_mm", [0.2, 0.4])
+def test_a_path_does_not_run_back_where_pieces_overlap(overlap_mm):
+    path = link([piece(0.0, 8.0), piece(8.0 - overlap_mm, 20.0)], np.array([0.1, 0.0, 0.5]), UP, 3.0, 1.0)
+    assert np.all(np.diff(path.points[:, 2]) > 0.0)
+    assert path.points[[0, -1], 2] == pytest.approx([0.0, 20.0], abs=0.25)
+
+
 def test_a_path_begins_with_the_wire_not_with_a_speck_that_lies_nearer_the_entry():
     """48 mm of wire in a cone-beam scan were followed for 2 mm: along a streak of 1 mm, a quarter as bright."""
     entry = np.array([0.0, 0.0, 0.5])

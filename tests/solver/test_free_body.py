@@ -60,5 +60,7 @@ def test_work_on_what_is_beyond_a_node_becomes_its_energy(cut: int) -> None:
 @pytest.mark.parametrize(("index", "depth"), [(44, 32.0), *later((11, 24.0))])
 def test_no_hop_of_a_soft_tip_is_lost_in_the_books_of_a_stiff_pair(index: int, depth: float) -> None:
     """At 22 and at 31 mm the tip lay 0.96 and 0.29 mm off short steps: what it missed was little beside the pair's."""
-    for mine, short in zip(pushed(1, index, depth), pushed(1, index, depth, 0.05), strict=True):
+    found = pushed(1, index, depth)
+    assert sum(mine.uncertain for mine in found) < 0.2 * len(found)
+    for mine, short in zip(found, pushed(1, index, depth, 0.05), strict=True):
         assert mine.uncertain or np.linalg.norm(mine.joints_mm - short.joints_mm, axis=1).max() < 0.01
