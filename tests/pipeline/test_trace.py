@@ -483,8 +483,8 @@ def test_a_curve_that_leaves_the_lumen_is_a_named_status():
 
 
 def test_below_the_least_contrast_a_previous_curve_counts_only_where_the_frame_confirms_it_up_to_the_tip():
-    """Seed 11: not nearly everywhere. Seed 15: the crest pauses before the tip, found behind that. 17: it does not."""
-    for seed, status in ((11, FrameStatus.TRACE_LOW_CONTRAST), (15, FrameStatus.OK), (17, FrameStatus.OK)):
+    """Seed 11: not nearly everywhere. Seed 15: the crest pauses before the tip, found behind that. 18: it does not."""
+    for seed, status in ((11, FrameStatus.TRACE_LOW_CONTRAST), (15, FrameStatus.OK), (18, FrameStatus.OK)):
         wire = plain(seed)
         alone, _ = tangles.run(seed, 2.0, wire=wire)
         assert alone.status is FrameStatus.TRACE_LOW_CONTRAST
