@@ -78,17 +78,26 @@ def levels_between(edges: Array, grey: Array, arc: Array, blur: float, beyond: b
     return level, float(np.sum((grey - design @ level) ** 2))
 
 
+AROUND = 4
+"""Edges to either side of one that is moved which are fitted with it: with all of 149, of a coil in voxels of 0.03 mm,
+that took 19 s."""
+
+
 def sharpened(edges: Array, grey: Array, arc: Array, blur: float) -> Array:
-    """The edges moved, one after the other, to where blurred steps fit a profile (n,) best."""
+    """The edges moved, one after the other, to where blurred steps fit a profile (n,) best around them."""
     edges = edges.copy()
     for width in (1.0, 0.3):
         for n in range(len(edges)):
+            first, stop = max(0, n - AROUND), min(n + AROUND + 1, len(edges))
+            begin = edges[first] if first else arc[0]
+            end = edges[stop - 1] if stop < len(edges) else arc[-1]
+            near = (arc >= begin) & (arc <= end)
             tries = edges[n] + width * blur * np.arange(-2, 3)
             low = edges[n - 1] if n else arc[0]
             high = edges[n + 1] if n + 1 < len(edges) else arc[-1]
             tries = tries[(tries > low + 0.5 * blur) & (tries < high - 0.5 * blur)]
-            moved = [np.concatenate([edges[:n], [t], edges[n + 1 :]]) for t in tries]
-            left = [levels_between(one, grey, arc, blur)[1] for one in moved]
+            moved = [np.concatenate([edges[first:n], [t], edges[n + 1 : stop]]) for t in tries]
+            left = [levels_between(one, grey[near], arc[near], blur)[1] for one in moved]
             if left:
                 edges[n] = tries[int(np.argmin(left))]
     return edges
