@@ -21,6 +21,8 @@ MOST_SHARE, MORE_VOXELS = 2.5, 0.75
 """The same ratio from which, and voxels by which, a line is thicker than any wire of the stated radius looks. The most
 of right traces in the scenes of ``tests.studies.seeing`` is 1.9 and 0.6; rods of 1 to 1.2 mm, of 0.36 stated, have 3 to
 4 and 1.4 to 2 in voxels of 0.3 mm."""
+SHORTEST_VOXELS = 15.0
+"""A shorter line hardly tells its blur: a right one of 10 voxels looked 0.81 voxels thicker than it was."""
 SHARPEST_VOXELS = 0.8
 """No line is taken to be blurred less: where what surrounds the vessel was set to one grey (a rotational X-ray scan of
 a head), its wall looks sharper (0.5) than a wire does, and each right trace there was refused."""
@@ -42,8 +44,13 @@ def too_thin(frames: Sequence[Frame], lumen: Lumen, radius_mm: float) -> list[st
 
 def not_too_thick(curve: Curve, lumen: Lumen, radius_mm: float) -> Curve:
     """The curve; ambiguous where its line is too thick for a wire of this radius: a rod, a catheter, another wire."""
-    seen = _seen_radius_mm(curve.levels.get("blur_mm", float("nan")), lumen, SHARPEST_VOXELS)
-    most = max(MOST_SHARE * radius_mm, radius_mm + MORE_VOXELS * float(np.min(lumen.distance.spacing_mm)))
+    seen, voxel = (
+        _seen_radius_mm(curve.levels.get("blur_mm", float("nan")), lumen, SHARPEST_VOXELS),
+        float(np.min(lumen.distance.spacing_mm)),
+    )
+    most = max(MOST_SHARE * radius_mm, radius_mm + MORE_VOXELS * voxel)
+    if curve.length_mm < SHORTEST_VOXELS * voxel:
+        return curve
     if curve.status is not FrameStatus.OK or not seen > most or LEVEL in curve.levels:  # what is cut off looks wide
         return curve
     note = (
