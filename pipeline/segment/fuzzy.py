@@ -43,10 +43,14 @@ def _at(grid: Grid, seeds: Index) -> str:
     return f"; the seed is at {' and '.join(said[:3])}"
 
 
-def _start(grid: Grid, seeds: Index) -> tuple[GreyLevels, Index]:
-    """Levels at the seed of greatest contrast over noise, and all the seeds moved to typical grey beside them."""
+def _start(grid: Grid, seeds: Index, outside: float | None) -> tuple[GreyLevels, Index]:
+    """Levels at the seed of greatest contrast over noise, and all the seeds moved to typical grey beside them.
+
+    outside : the grey around the vessel, where that at the seed is not the brightest.
+    """
     found = [levels_at(grid, seed) for seed in seeds]
     levels = max((f[0] for f in found), key=lambda a: a.contrast / max(a.noise, 1e-9))
+    levels = levels if outside is None else replace(levels, outside=outside)
     if not levels.contrast > LEAST_CONTRAST * levels.noise:
         got = f"grey: got {levels.inside:.0f} at the seed, {levels.outside:.0f} around, noise {levels.noise:.0f}"
         got += _at(grid, seeds)
@@ -83,11 +87,10 @@ def fuzzy_region(
     """The vessel that holds the seeds ((m, 3) LPS mm); raises StageError where they lie in none.
 
     grid : C-contiguous grey, brighter inside the vessel.  noise_left : see ``GreyLevels``, where the grid no longer
-    shows it.  outside : the grey around the vessel, where that at the seed is not the brightest.
+    shows it.  outside : see ``_start``.
     """
-    levels, seeds = _start(grid, seed_voxels(grid, seeds_mm))
+    levels, seeds = _start(grid, seed_voxels(grid, seeds_mm), outside)
     levels = levels if noise_left is None else replace(levels, noise_left=noise_left)
-    levels = levels if outside is None else replace(levels, outside=outside)
     affinity = estimate_affinity(levels, config)
     order, read = _connected(grid, seeds, levels, affinity, config)
     low, more = low_region(grid, seeds, levels, affinity)

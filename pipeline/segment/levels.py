@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import ndimage
 from scipy.special import chndtr
+from skimage.filters import threshold_otsu
 
-from pipeline.arrays.grids import unflattened
+from pipeline.arrays.grids import spread, unflattened
 from pipeline.model import Counters
 from pipeline.segment._kernels.voxels import rebased
 from pipeline.segment.noise import noise_left, smoothed, voxel_noise
@@ -23,6 +24,9 @@ BOXES_MM = 6.0, 10.0, 17.0, 30.0
 carotid artery and what is around it, up to an aorta, of which the first holds nothing but its own noise."""
 LEAST_BOX = 8
 """Its least half width in voxels."""
+EDGE, APART, TWO_GREYS = 0.25, 0.5, 4.5
+"""Share of the contrast below the seed's grey from which a voxel is not the vessel's. Then how far apart two greys
+around it are: over the brighter one's distance from the vessel, and over their spread."""
 LEAST_DARK = 0.05
 """Least share of the box that lies off the vessel, two voxels from anything as bright."""
 THICK = 5.0
@@ -99,12 +103,32 @@ class _Levels(NamedTuple):
     dark: float
 
 
-def _two_levels(grey: NDArray[Any], seed: float, at: tuple[int, ...], padding: NDArray[np.bool_]) -> _Levels:
-    """The two levels in a box, by fixed point. padding : voxels that surround nothing, unless there are no others.
+def _surroundings(grey: NDArray[Any], seed: float) -> tuple[float, float]:
+    """A first guess of what surrounds the vessel, and the grey below which voxels are no part of that.
+
+    Of two well apart it is the brighter: the other may be air, or what lies beyond a round field of view. They are
+    apart by Ashman's D, as two greys of a vessel are, and by half of what the brighter one is from the vessel.
+    """
+    darkest = float(np.percentile(grey, 10))
+    clear = ~ndimage.binary_dilation(grey > seed - EDGE * (seed - darkest), iterations=2)
+    dark = grey[clear]
+    if dark.size < LEAST_DARK * grey.size or np.ptp(dark) == 0.0:
+        return darkest, -np.inf
+    limit = float(threshold_otsu(dark))
+    low, high = dark[dark <= limit], dark[dark > limit]
+    wide = float(np.hypot(spread(low), spread(high))) / np.sqrt(2.0)
+    bottom, top = float(np.median(low)), float(np.median(high))
+    if high.size < LEAST_DARK * grey.size or top - bottom < max(TWO_GREYS * wide, APART * (seed - top)):
+        return darkest, -np.inf
+    return top, 0.5 * (bottom + top)
+
+
+def _two_levels(grey: NDArray[Any], seed: float, at: tuple[int, ...]) -> _Levels:
+    """The two levels in a box, by fixed point.
 
     The region's median is held near the seed's grey, lest bone that touches it be taken for the vessel.
     """
-    outside = float(np.percentile(grey[~padding], 10)) if not padding.all() else seed
+    outside, floor = _surroundings(grey, seed)
     inside = seed
     region = apart = np.zeros(grey.shape, bool)
     for _ in range(6):
@@ -117,28 +141,23 @@ def _two_levels(grey: NDArray[Any], seed: float, at: tuple[int, ...], padding: N
         inside = _median(grey[ndimage.binary_erosion(region)], whole)
         inside = min(inside, seed + 0.5 * (seed - outside))
         apart = ~ndimage.binary_dilation(bright, iterations=2)
-        shown = apart & ~padding
-        outside = _median(grey[shown if np.mean(shown) >= LEAST_DARK else apart], outside)
+        outside = _median(grey[apart & (grey > floor)], outside)
     return _Levels(inside, outside, region, float(np.mean(apart)))
 
 
 def levels_at(grid: Grid, index: NDArray[Any]) -> tuple[GreyLevels, NDArray[np.int64]]:
     """GreyLevels around one seed voxel, and the voxel (3,) to start at: that of median smoothed grey among its 3^3."""
-    darkest = float(grid.values.min())
     for half in BOXES_MM:
-        levels, found, dark = _levels_in(grid, box_around(grid, index, half, LEAST_BOX), index, darkest)
+        levels, found, dark = _levels_in(grid, box_around(grid, index, half, LEAST_BOX), index)
         if dark >= LEAST_DARK:
             break
     return levels, found
 
 
 def _levels_in(
-    grid: Grid, box: tuple[slice, slice, slice], index: NDArray[Any], darkest: float
+    grid: Grid, box: tuple[slice, slice, slice], index: NDArray[Any]
 ) -> tuple[GreyLevels, NDArray[np.int64], float]:
-    """What ``levels_at`` returns, of a box around the seed, and the share of the box that lies off the vessel.
-
-    darkest : grey of the scan; what lies outside a round field of view has it.
-    """
+    """What ``levels_at`` returns, of a box around the seed, and the share of the box that lies off the vessel."""
     raw = np.asarray(grid.values[box], np.float32)
     grey = smoothed(raw)
     start = np.array([s.start for s in box])
@@ -149,8 +168,7 @@ def _levels_in(
     seed = float(np.median(around))
     best = np.unravel_index(int(np.argmin(np.abs(around - seed))), around.shape)
     at = tuple(int(b) + s.start for b, s in zip(best, inner, strict=True))
-    padding = ndimage.binary_dilation(raw == darkest)
-    inside, outside, region, dark = _two_levels(grey, seed, at, padding)
+    inside, outside, region, dark = _two_levels(grey, seed, at)
     found = start + np.array(at)
     noise = voxel_noise(raw - grey, region)
     left = noise_left(raw, region, grey > 0.5 * (inside + outside), noise)

@@ -77,10 +77,10 @@ class Sides:
         """One sentence for the report where other tissue lies around the vessel, or none."""
         if self.around == (0.0, 0.0):
             return ()
-        low, high = (f"{100 * share:.0f}" for share in self.around)
+        low, high = (round(100 * share) for share in self.around)
         return (
             f"segment: what lies around the vessel differs, from {low} to {high} % of the way from what it is at the "
-            "seed to the vessel's grey; the wall was taken half way to what lies next to it: look at the picture",
+            "seed to the vessel's grey; its wall was moved towards half way to what lies next to it: see the picture",
         )
 
 

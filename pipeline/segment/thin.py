@@ -55,7 +55,7 @@ LEAST_RADIUS = 0.6
 """Voxels: a thinner tube falls between the nodes of the distance and comes to pieces."""
 OVERLAP_VOXELS = 1.0
 """Balls of LEAST_RADIUS that are no farther apart overlap, others are bridged: taken for one piece up to 2 voxels
-apart, 8 of 18 branches of 0.67 voxels radius came to pieces."""
+apart, 4 to 8 of 18 branches of 0.67 voxels radius came to pieces."""
 NEAR_VOXELS = 3.0
 """Radius in which a crest point is compared with the highest one."""
 HIGHEST = 0.85
@@ -143,11 +143,11 @@ def warning(grid: Grid, faint: Sequence[Index]) -> tuple[str, ...]:
     if not faint:
         return ()
     place, count = grid.to_mm(faint[0]).round(1).tolist(), len(faint)
-    many = f"{count} branches are" if count > 1 else "a branch is"
+    many = f"{count} things like branches are" if count > 1 else "something like a branch is"
     return (
-        f"segment: {many} filled to half of the vessel's contrast or less, and left out of the lumen "
-        f"({'the first ' * (count > 1)}at {place} mm); where a wire may go there, scan with them filled, or give the "
-        "lumen as a file (manifest key lumen)",
+        f"segment: {many} too faint for the wall's level, half of the vessel's contrast, and left out of the lumen "
+        f"({'the first ' * (count > 1)}at {place} mm); where it is a branch that is filled too little, and a wire may "
+        "go there, scan with it filled, or give the lumen as a file (manifest key lumen)",
     )
 
 

@@ -9,7 +9,7 @@ import math
 from typing import Any
 
 from solver import _tolerances as tol
-from solver._kernels.algebra import farthest, load3, scaled, store3
+from solver._kernels.algebra import dot, load3, scaled, store3
 from solver._kernels.data import Problem
 from solver._kernels.energy import energy_of, stiffest, total_energy
 from solver._kernels.flags import cached, kernel, merged
@@ -40,23 +40,30 @@ def rests(problem: Problem, k: int, now: Any) -> bool:
 
 @cached
 def spring_back(problem: Problem, slot: int, k: int) -> bool:
-    """Lead the wire straight to its rest shape, into the trial state, and stop where it touches; whether it never does.
+    """Lead the wire to its rest shape, into the trial state, and stop where it touches; whether it never does.
 
     No joint goes on by more than half a voxel at a time, between which the grid has no wall.
     """
-    state, parts = problem.state, problem.state.energies[1 - slot]
-    towards_rest(problem, slot, k, 1.0)
-    steps = 1
+    parts, steps = problem.state.energies[1 - slot], 1
     if problem.stiffness > 0.0:
-        way = farthest(state.x[slot], 0, state.x[1 - slot], 0, k + 1)
-        steps = max(1, math.ceil(2.0 * way / problem.field.spacing))
+        steps = max(1, math.ceil(2.0 * longest_way(problem, slot, k) / problem.field.spacing))
     for i in range(1, steps + 1):
-        if steps > 1:
-            towards_rest(problem, slot, k, i / steps)
+        towards_rest(problem, slot, k, i / steps)
         if parts.wall > 0.0 or parts.friction > 0.0:
             meet(problem, slot, k, (i - 1) / steps, i / steps)
             return False
     return True
+
+
+@kernel
+def longest_way(problem: Problem, slot: int, k: int) -> float:
+    """No joint goes a longer way to the rest shape, mm: each turn swings all that lies beyond it."""
+    way, beyond = 0.0, 0.0
+    for j in range(k - 1, -1, -1):
+        beyond += problem.chain.length[j]
+        u = load3(problem.state.u[slot], j)
+        way += math.sqrt(dot(u, u)) * beyond
+    return way
 
 
 @kernel

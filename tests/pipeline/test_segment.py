@@ -68,12 +68,15 @@ def test_the_wall_of_an_aorta_is_where_it_was_drawn(radius):
     assert np.abs(np.mean(error - np.hypot(at[:, 0], at[:, 1]))) < 0.1 * voxel
 
 
-def test_nothing_beyond_a_round_field_of_view_is_what_surrounds_a_vessel():
-    """Set to -1000 there, a vessel at the rim was told from it, and the lumen was the whole body, frames refused."""
+@pytest.mark.parametrize(("noise", "spot"), [(0.0, -1000.0), (0.0, -1024.0), (40.0, -1000.0)])
+def test_nothing_beyond_a_round_field_of_view_is_what_surrounds_a_vessel(noise, spot):
+    """Set to -1000 there, or air, a vessel at the rim was told from it: the lumen was the body, frames were refused."""
     voxel, x, z = 0.3, np.arange(60) * 0.3 - 9.0, np.arange(50) * 0.3
     off = np.hypot(x[:, None, None], x[None, :, None] - 6.5 + 0.15 * z) - 1.5
     grey = phantoms.scan(phantoms.BACKGROUND + 900.0 * phantoms.partial_volume(off, voxel), 0.8, 40.0, seed=1)
-    grey[np.hypot(x[:, None], x) > 8.2] = -1000.0
+    beyond = np.hypot(x[:, None], x) > 8.2
+    grey[beyond] = -1000.0 + np.random.default_rng(2).normal(0.0, noise, (np.count_nonzero(beyond), len(z)))
+    grey[0, 0, 0] = spot
     lumen = segment(Volume(np.asfortranarray(grey), [voxel] * 3, [x[0], x[0], 0.0]), [[0.0, 5.6, 6.0]])
     index = np.argwhere(lumen.distance.values < 0)
     at = lumen.distance.to_mm(index)

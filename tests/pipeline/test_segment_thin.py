@@ -70,7 +70,7 @@ def test_a_branch_that_is_filled_too_little_is_said(share, expected):
     trunk = phantoms.partial_volume(np.hypot(POINTS[..., 0], POINTS[..., 1]) - 1.5, VOXEL)
     clean = 100.0 + 900.0 * np.maximum(trunk, share * phantoms.partial_volume(branch, VOXEL))
     lumen = segment(Volume(np.asfortranarray(phantoms.scan(clean, 0.8, 60.0, 3)), [VOXEL] * 3, LOW), [[0.0, 0.0, 0.0]])
-    assert any("filled to half" in text for text in lumen.warnings) is expected
+    assert any("something like a branch" in text for text in lumen.warnings) is expected
 
 
 @pytest.mark.parametrize(("gap_mm", "tilt_deg"), [(0.6, 0.0), (0.8, 0.0), (0.6, 40.0), (0.8, 70.0)])

@@ -168,6 +168,17 @@ def test_a_tip_that_an_edge_holds_comes_off_where_it_must_and_is_told(left_out: 
     assert gone.uncertain
 
 
+def test_a_wire_that_unrolls_stops_at_a_thin_wall_on_its_way() -> None:
+    """Joints go along arcs, which are longer than the chord to where they end: a thin wall could be passed between."""
+    wall = VesselWall(sampled(lambda p: 0.3 - np.abs(p[..., 0] - 4.0), 0.4, (-12, -3, -10), (12, 3, 24)), 50.0)
+    for length, curvature in ((18.0, -0.3), (18.0, 0.0), (12.0, -0.2)):
+        how: dict[str, Any] = {"depth_mm": length, "material_axis": [1, 0, 0]}
+        start = relax(GuideWire(0.5, 0.18, 1.0, curvature), None, **how).joints_mm
+        found = relax(GuideWire(0.5, 0.18, 1.0, 0.3), wall, start_mm=start, **how)
+        assert found.converged
+        assert found.joints_mm[:, 0].max() < 4.0, "it lies on this side"
+
+
 def test_a_smooth_insertion_is_left_alone() -> None:
     wall, wire = VesselWall(bend_grid(), 1.0), GuideWire(1.0, 0.18, 10.0)
     both = []
