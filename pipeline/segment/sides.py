@@ -99,15 +99,25 @@ class _Wall:
     feet: Array
     normals: Array
 
-    def beside(self, way: float) -> tuple[Index, Array]:
-        """Which places have room beside them, ``way`` -1 inside and 1 outside, and the share (m,) of contrast there."""
+    @property
+    def step(self) -> int:
+        """Every which of its places makes LOOKED_AT, or so."""
+        return max(1, len(self.feet) // LOOKED_AT)
+
+    @property
+    def some(self) -> "_Wall":
+        """The same with these places alone."""
+        return replace(self, feet=self.feet[:: self.step], normals=self.normals[:: self.step])
+
+    def beside(self, way: float) -> tuple[Array, Array]:
+        """Places (m, 3) with room beside them, ``way`` -1 inside, 1 outside, and the share (m,) of contrast there."""
         h = float(np.max(self.scan.spacing_mm))
         index = np.rint((self.feet + way * BESIDE * h * self.normals) / self.scan.spacing_mm).astype(np.int64)
         index -= self.corner
         kept = np.all((index >= 0) & (index < self.distance.shape), axis=1)
         kept[kept] = way * self.distance.values[tuple(index[kept].T)] > ROOM * h
-        at = np.flatnonzero(kept)
-        return at, (grey_around(self.scan, index[at] + self.corner) - self.levels.outside) / self.levels.contrast
+        grey = grey_around(self.scan, index[kept] + self.corner)
+        return self.feet[kept], (grey - self.levels.outside) / self.levels.contrast
 
 
 def sides_of(
@@ -132,35 +142,43 @@ def sides_of(
 
 def _filled(wall: _Wall, wire: bool) -> Sides | None:
     """How far the vessel is filled along its wall, if that differs."""
-    at, share = wall.beside(-1.0)
-    if len(at) < LEAST_PLACES:
+
+    def read(wall: _Wall) -> tuple[Array, Array]:
+        feet, share = wall.beside(-1.0)
+        return feet, np.clip(share, LOWEST, HIGHEST if wire else BRIGHTER)
+
+    low, full = _extremes(*read(wall.some), wall.step, 50.0 if wire else 100.0 - FEW)
+    if not low < EVEN * full:
         return None
-    share = np.clip(share, LOWEST, HIGHEST if wire else BRIGHTER)
-    low, full = _extremes(wall.feet[at], share, 50.0 if wire else 100.0 - FEW)
-    if low >= EVEN * full:
-        return None
-    places = cKDTree(wall.feet[at])
-    return Sides(places, _around(places, share, AROUND), np.zeros(len(at)), low, low / full)
+    feet, share = read(wall)
+    places = cKDTree(feet)
+    return Sides(places, _around(places, share, AROUND), np.zeros(len(feet)), low, low / full)
 
 
 def _around_it(wall: _Wall) -> Sides | None:
     """What surrounds the vessel along its wall, if that differs from what does at the seed."""
-    at, share = wall.beside(1.0)
-    at, share = at[share < TISSUE], share[share < TISSUE]
-    if len(at) < LEAST_PLACES:
+
+    def read(wall: _Wall) -> tuple[Array, Array]:
+        feet, share = wall.beside(1.0)
+        return feet[share < TISSUE], share[share < TISSUE]
+
+    low, high = _extremes(*read(wall.some), wall.step, 100.0 - FEW)
+    if not (low <= -ALIKE or high >= ALIKE):
         return None
-    low, high = _extremes(wall.feet[at], share, 100.0 - FEW)
-    if low > -ALIKE and high < ALIKE:
-        return None
-    places = cKDTree(wall.feet[at])
-    return Sides(places, np.ones(len(at)), _around(places, share, WIDELY), around=(low, max(high, 0.0)))
+    feet, share = read(wall)
+    places = cKDTree(feet)
+    return Sides(places, np.ones(len(feet)), _around(places, share, WIDELY), around=(low, max(high, 0.0)))
 
 
-def _extremes(feet: Array, share: Array, most: float) -> tuple[float, float]:
-    """The FEW-th and the ``most``-th percentile of shares (n,) at places (n, 3), each a mean over WIDELY of them."""
-    step = max(1, len(feet) // LOOKED_AT)
-    places = cKDTree(feet[::step])
-    low, high = np.percentile(_around(places, share[::step], min(WIDELY // step, places.n // 4)), (FEW, most))
+def _extremes(feet: Array, share: Array, step: int, most: float) -> tuple[float, float]:
+    """The FEW-th and the ``most``-th percentile of shares (n,) at places (n, 3), each a mean over those around it.
+
+    step : every which of all places these are, of which WIDELY are averaged.  NaN where there are too few.
+    """
+    if len(feet) * step < LEAST_PLACES:
+        return np.nan, np.nan
+    places = cKDTree(feet)
+    low, high = np.percentile(_around(places, share, max(1, min(WIDELY // step, len(feet) // 4))), (FEW, most))
     return float(low), float(high)
 
 
