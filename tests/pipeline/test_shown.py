@@ -75,8 +75,9 @@ def test_a_frame_that_failed_in_a_lumen_far_off_says_that_first() -> None:
         _first_said(bad, "the lumen lies off").message == "the lumen lies off; look at that first. trace: wire: got two"
     )
     assert _first_said(bad, "").message == "trace: wire: got two"
-    good = Frame(0)
-    assert _first_said(good, "the lumen lies off") is good
+    unread = Frame(0).failed("load", FrameStatus.LOAD_FAILED, "w.mha: cut off")
+    for other in (Frame(0), unread):
+        assert _first_said(other, "the lumen lies off") is other, "an unreadable file has nothing to do with the lumen"
 
 
 def test_a_scan_without_the_vessel_says_nothing(tube: Grid) -> None:
