@@ -13,8 +13,8 @@ from pipeline.simulate.config import SimulateConfig
 LUMEN_VOXELS, LUMEN_NOISE_VOXELS, LUMEN_BIAS_VOXELS = 0.07, 0.1, 0.05
 """Standard deviations of the lumen's surface in voxels: place by place apart from noise (measured with 0.2 to 0.6 mm
 voxels); place by place by noise, where the lumen does not come from a scan, which states its own; and common to the
-whole surface (measured: 0.03 at most). A right label map is as well known: 0.03 to 0.14 from place to place, 0.02 to
-0.09 in common (tubes of 1.5 voxels' radius and more, at all angles to the grid)."""
+whole surface (measured: 0.03 at most). A right label map is as well known: to 0.1 (docs/howto/scans.md). Of voxels that
+are no cubes the longest side counts."""
 INSERTION_MM = 0.5
 """Standard deviation of a depth that is read from a scale on the wire's shaft."""
 ROLL_DEG = 5.0

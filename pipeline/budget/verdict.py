@@ -34,7 +34,7 @@ def axes_across(curve_mm: Array, arc_mm: Array) -> Array:
 def widening(count: int) -> float:
     """Squared radius of the 95 % ellipse in standard deviations, of a second moment from ``count`` members (Hotelling).
 
-    It is about the nominal wire, which is no estimate: about a mean it would be (n + 1) / (n - 2) F(2, n - 2).
+    It is about the nominal wire, which is no estimate: no degree of freedom is spent on a mean.
     """
     if count < 4:
         return float("nan")

@@ -157,7 +157,7 @@ def _followed(problem: Problem, linear: Linear, fixed: int, x: Array, residual: 
     for jacobian, r in zip(linear.jacobian, residual, strict=True):
         right = right + jacobian.T @ r
     held, moved = np.arange(len(x)) == fixed, x
-    while True:
+    for _ in x:  # each turn but the last holds one more
         pull = right - linear.normal[:, held] @ (moved - x)[held]
         moved = np.where(held, moved, 0.0)
         moved[~held] = x[~held] + np.linalg.solve(linear.normal[np.ix_(~held, ~held)], pull[~held])
@@ -165,6 +165,7 @@ def _followed(problem: Problem, linear: Linear, fixed: int, x: Array, residual: 
         if np.array_equal(inside, moved):
             return moved
         held, moved = held | (inside != moved), inside
+    return x  # nothing follows residuals that are no numbers
 
 
 def _errors(last: Fit, evidence: Sequence[Evidence]) -> list[FrameError]:

@@ -28,33 +28,33 @@ LEAST_NOISES = 2.0
 """Contrast over a voxel's noise below which a scan is not asked."""
 ROUNDS = 8
 OFF_VOXELS = 0.5
-"""From here on the lumen is off: the wall of `segment` is found to 0.15 voxel, a right label map's to 0.3."""
+"""From here on the lumen is off: all kinds tell the wall to 0.2 voxel or better (docs/howto/scans.md)."""
 FAR_VOXELS = 2.0
 """From here on it is what frames fail by: traces are looked for within a voxel of the wall."""
 
 
-class Doubt(NamedTuple):
+class LumenDoubt(NamedTuple):
     """What a scan says against a lumen; empty where it says nothing.     far : it is off by FAR_VOXELS or more."""
 
     told: str = ""
     far: bool = False
 
 
-def beside_the_wall(lumen: Lumen, scan: Volume) -> Doubt:
+def beside_the_wall(lumen: Lumen, scan: Volume) -> LumenDoubt:
     """A sentence where a lumen is larger, smaller or elsewhere than the vessel that a scan without wire shows."""
     voxel = float(np.max(scan.spacing_mm))
     points, normals, distance = _near(lumen, 2.0 * NEAR_VOXELS * voxel)
     index = scan.to_index(points)
     seen = np.all((index > 0) & (index < np.array(scan.shape) - 1), axis=1)
     if np.count_nonzero(seen) < LEAST_POINTS:
-        return Doubt()
+        return LumenDoubt()
     grey = ndimage.map_coordinates(scan.values, index[seen].T, order=1, output=np.float64)
     layer = layer_in(distance[seen] / voxel, grey)
     if layer is not None:  # what is darker than the phantom's wall tells nothing of the vessel's
         grey = np.maximum(grey, layer.floor)
     found = _offset(grey, normals[seen], distance[seen] / voxel)
     if found is None:
-        return Doubt()
+        return LumenDoubt()
     larger, shift = found[0] * voxel, found[1:] * voxel
     off = []
     if abs(larger) > OFF_VOXELS * voxel:
@@ -63,10 +63,10 @@ def beside_the_wall(lumen: Lumen, scan: Volume) -> Doubt:
         away = ", ".join(f"{-s:.2f}" for s in shift)
         off.append(f"({away}) mm (LPS) away from where the scan shows the vessel")
     if not off:
-        return Doubt()
+        return LumenDoubt()
     do = "check its axes (LPS or RAS), registration and unit, whether radii are diameters, and how it was segmented"
     far = bool(max(abs(larger), np.linalg.norm(shift)) >= FAR_VOXELS * voxel)
-    return Doubt(f"the given lumen lies {' and '.join(off)}: {do}", far)
+    return LumenDoubt(f"the given lumen lies {' and '.join(off)}: {do}", far)
 
 
 def _near(lumen: Lumen, reach_mm: float) -> tuple[Array, Array, Array]:

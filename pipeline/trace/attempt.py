@@ -55,7 +55,8 @@ class Attempt:
     pieces : all crests that were seen; known : points (n, 3) that count as explained besides the tube's.
     behind_mm : length of the line before the path's first point, outside the entry.  goes_on : whether something faint
     is seen past its tip.  confirmed : whether the manifest states a length.  short : whether it is hardly any of that
-    length.  agrees : whether it is that length.  late_mm : wire missing at the entry.
+    length.  agrees : whether it is that length, missing_mm : what it lacks of it, NaN for none stated.  late_mm : wire
+    missing at the entry.
     """
 
     tube: Tube
@@ -70,6 +71,7 @@ class Attempt:
     short: bool = False
     agrees: bool = False
     late_mm: float = 0.0
+    missing_mm: float = float("nan")
 
     @property
     def leftover_mm(self) -> float:

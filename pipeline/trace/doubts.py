@@ -97,6 +97,8 @@ def ends_in_nothing(image: Subtraction, attempt: Attempt, curve: Curve) -> Curve
     if not image.correlated and not attempt.agrees and highest(ways, least) > SURE:
         tip = named(image, dense(tube, image.voxel)[-1])
         got, allowed = f"a faint line {GOES_ON}, from {tip} mm on", "a tip with nothing beyond it"
+        if attempt.missing_mm > 0.0:
+            got += f", where {attempt.missing_mm:.1f} mm of the stated depth are missing"
         do = "look whether the wire's end is fainter than the rest; scan with more dose"
         return replace(curve, status=FrameStatus.TRACE_AMBIGUOUS, note=note_of(got, allowed, do))
     if highest(ways, faint) > STREAK_SURE:

@@ -55,8 +55,9 @@ BLUNT_TIP = 0.2
 0.9 mm wires was 2 times too small)."""
 TIPS_MM = 1.5
 """Most that two fits of one wire, before and after its background is told from it, may end apart."""
-AGREES_MM = 1.0
-"""How near a stated depth a length confirms it: twice the standard deviation that a depth has by default."""
+AGREES_MM, AGREES_VOXELS = 1.0, 3.0
+"""How near a stated depth a length confirms it: twice the standard deviation that a depth has by default, but no more
+than a few voxels: 10 of 0.1 mm would be a faint end that was cut off."""
 BRIDGE_SIGMA_VOXELS = 0.5
 """Standard deviation across the wire that a point on a bridged gap gets at least."""
 
@@ -110,9 +111,12 @@ def _read_off(image: Subtraction, attempt: Attempt | None, entry: EntryPose) -> 
     length = float(arc_length(image.world(points))[-1])
     late = float((points[0] - entry.point) @ entry.direction)
     stated = entry.expected_mm
-    agrees = stated is not None and abs(length - stated) < AGREES_MM
+    missing = np.nan if stated is None else stated - length
+    agrees = abs(missing) < min(AGREES_MM, AGREES_VOXELS * image.voxel)
     short = hardly_begun(length, stated)
-    attempt = replace(attempt, confirmed=stated is not None, short=short, agrees=agrees, late_mm=late)
+    attempt = replace(
+        attempt, confirmed=stated is not None, short=short, agrees=agrees, late_mm=late, missing_mm=missing
+    )
     verdict = judge(image, attempt, points, _on_bridges(points, attempt, image.voxel), length)
     return [Candidate(attempt, points, *point_sigmas(attempt.tube, u), length, verdict)]
 

@@ -306,6 +306,14 @@ def test_what_follows_in_a_profile_stays_within_its_bounds():
         assert moved == pytest.approx([taper, *best.x], abs=1e-4)
 
 
+def test_nothing_follows_residuals_that_are_no_numbers():
+    """A profile that met one never ended."""
+    problem: Any = SimpleNamespace(prior=(np.zeros(2), np.full(2, np.inf)), clipped=lambda x: np.maximum(x, -1.0))
+    linear: Any = SimpleNamespace(normal=np.eye(2), jacobian=[np.eye(2)])
+    start = np.array([0.1, 0.2])
+    assert np.array_equal(_followed(problem, linear, 0, start, [np.full(2, np.nan)]), start)
+
+
 def test_derivatives_are_those_of_whole_insertions():
     one = Evidence(trial())
     problem = Problem(all_of(one.trial), {}, (one,), SETTINGS)

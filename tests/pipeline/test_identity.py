@@ -17,7 +17,7 @@ from pipeline.load import Crop, LoadError, Source, each_volume, load, parts_of, 
 from pipeline.load.config import LoadConfig
 from pipeline.load.geometry import Mask
 from pipeline.load.order import in_order
-from pipeline.model import Volume
+from pipeline.model import Array, Volume
 from pipeline.run.hashing import file_hash
 from pipeline.run.store import digest
 from pipeline.study.first_wire import AT_EDGE, IN_PLACE, MOVED_IN, infer_entry
@@ -303,6 +303,28 @@ def test_an_entry_lies_in_the_vessel_that_the_reference_shows(medium: float, beg
     np.testing.assert_allclose(entry, [begins, 10.0, 10.0], rtol=0.0, atol=1.0)  # a voxel
     assert which == AT_EDGE + MOVED_IN * (medium > 0)
     assert direction[0] > 0.99
+
+
+@pytest.mark.parametrize(
+    ("medium", "begins"),
+    [
+        (np.where(np.arange(60) < 20, 800.0, 1000.0), 1.0),
+        (np.linspace(750.0, 1150.0, 60), 1.0),
+        (np.where(np.arange(60) < 24, 0.0, 1000.0), 24.0),
+        (np.where(np.arange(60) < 30, 0.0, 1000.0), 1.0),
+    ],
+    ids=["a fifth thinner", "rising", "half of it outside", "most of it outside"],
+)
+def test_an_entry_is_not_moved_through_medium_that_is_thinner_there(medium: Array, begins: float) -> None:
+    """It lay 20 of 49 voxels in the vessel, of whose medium a fifth was missing up to there; 11 where it rose."""
+    values = np.random.default_rng(0).normal(0.0, 40.0, (60, 24, 24)).astype(np.float32)
+    values[:, 7:17, 7:17] += medium[:, None, None]
+    wire = np.zeros_like(values)
+    wire[1:50, 12, 12] = 5000.0
+    reference, frame = Volume(values, np.ones(3), np.zeros(3)), Volume(values + wire, np.ones(3), np.zeros(3))
+    entry, _, which = infer_entry(frame, reference, Path("f.mha"))
+    np.testing.assert_allclose(entry, [begins, 12.0, 12.0], rtol=0.0, atol=1.0)  # a voxel
+    assert which == AT_EDGE + MOVED_IN * (begins > 1.0)
 
 
 @pytest.mark.parametrize("zero", [0, -1000, 3000, 10000, -5000])

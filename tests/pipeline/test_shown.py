@@ -12,9 +12,9 @@ from scipy.special import ndtr
 from pipeline.model import Lumen, Volume
 from pipeline.run.stages.known import Frame
 from pipeline.run.stages.trace import _first_said
-from pipeline.segment.shown import Doubt, beside_the_wall
+from pipeline.segment.shown import LumenDoubt, beside_the_wall
 from pipeline.status import FrameStatus
-from reports.doubts import Doubt as Warned
+from reports.doubts import Doubt
 from solver import Grid
 from tests.pipeline.phantoms import helix
 
@@ -47,14 +47,14 @@ def larger(tube: Grid, by_mm: float) -> Lumen:
 
 @pytest.mark.parametrize("by_mm", [-0.1, 0.0, 0.1])
 def test_a_lumen_that_fits_is_nothing_to_speak_of(tube: Grid, by_mm: float) -> None:
-    assert beside_the_wall(larger(tube, by_mm), scan_of(tube)) == Doubt()
+    assert beside_the_wall(larger(tube, by_mm), scan_of(tube)) == LumenDoubt()
 
 
 @pytest.mark.parametrize("by_mm", [0.4, 1.0, 1.1, -0.4, -0.8])
 def test_a_lumen_of_another_size_is_told_by_how_much(tube: Grid, by_mm: float) -> None:
     """A mask dilated by one voxel multiplied the error by 3.5, and nothing was said."""
     told, far = beside_the_wall(larger(tube, by_mm), scan_of(tube))
-    assert Warned(warnings=[told]).against, "pages name it first"
+    assert Doubt(warnings=[told]).against, "pages name it first"
     assert far is (abs(by_mm) > 2.0 * VOXEL)
     assert ("outside the wall" if by_mm > 0 else "inside the wall") in told
     found = float(told.partition("lies ")[2].partition(" mm")[0])
@@ -75,12 +75,13 @@ def test_a_frame_that_failed_in_a_lumen_far_off_says_that_first() -> None:
         _first_said(bad, "the lumen lies off").message == "the lumen lies off; look at that first. trace: wire: got two"
     )
     assert _first_said(bad, "").message == "trace: wire: got two"
-    good = Frame(0)
-    assert _first_said(good, "the lumen lies off") is good
+    unread = Frame(0).failed("load", FrameStatus.LOAD_FAILED, "w.mha: cut off")
+    for other in (Frame(0), unread):
+        assert _first_said(other, "the lumen lies off") is other, "an unreadable file has nothing to do with the lumen"
 
 
 def test_a_scan_without_the_vessel_says_nothing(tube: Grid) -> None:
     """Taken without contrast medium: the user's lumen is all there is."""
-    assert beside_the_wall(larger(tube, 1.0), scan_of(tube, contrast=100.0)) == Doubt()
+    assert beside_the_wall(larger(tube, 1.0), scan_of(tube, contrast=100.0)) == LumenDoubt()
     away = scan_of(tube)
-    assert beside_the_wall(larger(tube, 1.0), replace(away, origin_mm=away.origin_mm + 500.0)) == Doubt()
+    assert beside_the_wall(larger(tube, 1.0), replace(away, origin_mm=away.origin_mm + 500.0)) == LumenDoubt()

@@ -238,8 +238,10 @@ def test_a_faint_line_beyond_a_tip_of_the_stated_depth_refuses_nothing(monkeypat
     """The wall beside a label map's stairs was 10 standard deviations of noise: a right frame of 7 was refused."""
     image, entry, best = traced()
     assert not best.attempt.agrees
-    stated = explain._read_off(image, best.attempt, replace(entry, expected_mm=best.length_mm + 0.9))[0]
+    stated = explain._read_off(image, best.attempt, replace(entry, expected_mm=best.length_mm + 0.8))[0]
+    longer = explain._read_off(image, best.attempt, replace(entry, expected_mm=best.length_mm + 0.96))[0]
     assert stated.attempt.agrees
+    assert not longer.attempt.agrees, "it lacks more than three voxels"
     monkeypatch.setattr(doubts, "_beyond", lambda image, tube, *_: np.array([[0.1 * tube.peak, SURE + 1.0]]))
     curve = trace(*scans(16)[::2], *vessel()[4:], reference=scans(16)[1])
     found = doubts.ends_in_nothing(image, best.attempt, replace(curve, status=FrameStatus.OK))
@@ -248,6 +250,8 @@ def test_a_faint_line_beyond_a_tip_of_the_stated_depth_refuses_nothing(monkeypat
     assert np.linalg.norm(place - curve.points_mm[-1]) < 0.1
     kept = doubts.ends_in_nothing(image, stated.attempt, replace(curve, status=FrameStatus.OK))
     assert kept.status is FrameStatus.OK
+    lacking = doubts.ends_in_nothing(image, longer.attempt, replace(curve, status=FrameStatus.OK))
+    assert "mm on, where 1.0 mm of the stated depth are missing; expected" in lacking.note
 
 
 def test_the_last_voxels_of_a_wire_are_no_line_beyond_its_tip():

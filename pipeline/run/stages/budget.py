@@ -143,7 +143,8 @@ class Work:
         self.nominal = Nominal(known.held, depth, roll, replace(config.simulate, friction=friction), traced)
         stated = {"roll_deg": case.roll_sigma_deg, **asdict(case.uncertainty)}
         noise = known.vessel.levels.get("wall_noise_mm")
-        known_to = self._depth_sigmas(stops), self.voxel, noise, case.calibrated_sigma
+        longest = float(np.max(known.vessel.distance.spacing_mm))
+        known_to = self._depth_sigmas(stops), longest, noise, case.calibrated_sigma
         self.sigmas = sigmas_of(stated, self.nominal, case.wire, *known_to)
         self.seen = [self._seen(frame) for frame in frames]
         wires = [frame.simulated.joints_mm for frame in stops if frame.simulated is not None]

@@ -20,7 +20,7 @@ from pipeline.segment.hollows import hollows
 from pipeline.segment.levels import failed
 from pipeline.segment.opened import outside_mm
 from pipeline.segment.pieces import in_pieces
-from pipeline.segment.shown import Doubt, beside_the_wall
+from pipeline.segment.shown import LumenDoubt, beside_the_wall
 from pipeline.status import StageError
 from pipeline.trace.warm import warm_up
 from reports.frames_file import ScanCrop
@@ -107,15 +107,15 @@ def _box_of(lumen: Lumen) -> tuple[Array, Array]:
     return inside.min(axis=0), inside.max(axis=0)
 
 
-def _held_against(run: Context, known: Known, lumen: Lumen) -> Doubt:
+def _held_against(run: Context, known: Known, lumen: Lumen) -> LumenDoubt:
     """What the case's first scan, if it has one, says of the user's own lumen."""
     scan = None if known.scans is None else known.scans.first
     if scan is None:
-        return Doubt()
+        return LumenDoubt()
     try:
         shown = run.load(Crop(scan, scan.box_of(corners_mm(lumen.distance)), run.config.load))
     except StageError:  # said where it is read to be traced
-        return Doubt()
+        return LumenDoubt()
     with run.log.timed("segment"):
         return beside_the_wall(lumen, shown)
 

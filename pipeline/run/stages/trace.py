@@ -107,8 +107,8 @@ def _in_step(run: Context, frames: list[Frame], voxel_mm: float) -> list[Frame]:
 
 
 def _first_said(frame: Frame, lumen_doubt: str) -> Frame:
-    """The frame; one that failed in a lumen that is far off says so first: the reference was blamed, or the wire."""
-    if frame.ok or not lumen_doubt:
+    """The frame; one not traced in a lumen that is far off says so first: the reference was blamed, or the wire."""
+    if frame.stage != "trace" or not lumen_doubt:
         return frame
     return replace(frame, message=f"{lumen_doubt}; look at that first. {frame.message}")
 
