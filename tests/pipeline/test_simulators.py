@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from pipeline.cli import main
 from pipeline.run.overall import found_cases, overall, ratio
-from pipeline.run.simulators import OF_SKILL, Piece, _rows, side_by_side, write_comparison
+from pipeline.run.simulators import OF_SKILL, Piece, _as_far, _rows, side_by_side, write_comparison
 from pipeline.run.stages import others
 from pipeline.run.stages.known import Known
 from reports import tables
@@ -198,7 +198,7 @@ def test_who_failed_frames_stands_below_who_did_not(tmp_path: Path) -> None:
 
 def test_who_is_nearest_where(compared: Path) -> None:
     where = pd.read_csv(compared / "where.csv")
-    lead = where[where["lead"].notna() & (where["along"] == "distance from the tip")].set_index("low_mm")
+    lead = where[where["lead"].notna() & (where["along"] == "distance from the earliest tip")].set_index("low_mm")
     assert dict(lead["simulator"]) == {0.0: "tip", 5.0: "tip", 10.0: "tip"} | dict.fromkeys(
         (15.0, 20.0, 25.0, 30.0, 35.0, 40.0), "wireval"
     )
@@ -269,12 +269,42 @@ def test_a_wire_that_ends_early_is_not_nearer_than_the_whole_one(tmp_path: Path,
     assert pair["rms_ratio_high"].item() < 1.0 < pair["back_ratio_low"].item()
     assert not any(line.startswith("early is nearer") for line in said)
     assert alone.set_index("simulator").loc["early", "tip_max_mm"] == early_mm
-    where = pd.read_csv(tmp_path / "where.csv").query("simulator == 'early' and along == 'distance from the tip'")
+    where = pd.read_csv(tmp_path / "where.csv").query(
+        "simulator == 'early' and along == 'distance from the earliest tip'"
+    )
     assert set(where["lead"].dropna()) <= {"tie", "the tips lie off"}
     shown = render_simulators(tmp_path).read_text(encoding="utf-8")
     assert shown.index(">whole<") < shown.index(">early<"), "in the table"
     assert bool(remarks(overall(found_cases(early)))) == (back > 2.0)
     assert "is better" not in ratio(found_cases(whole), found_cases(early)).verdict()  # type: ignore[union-attr]
+
+
+def test_a_short_wire_that_is_off_shortens_no_comparison(tmp_path: Path) -> None:
+    """Of wires to 50 mm the last 7 mm before 12 mm were compared, since one that may not be the nearest ended there."""
+    whole = write_tree(tmp_path / "whole", even(0.2))
+    short = cut(whole, tmp_path / "short", 9.5, (0, 1, 2, 3), 3.0)
+    other = write_tree(tmp_path / "other", even(0.3))
+    write_comparison(tmp_path, {"short": short, "other": other, "whole": whole})
+    where = pd.read_csv(tmp_path / "where.csv").query("along == 'distance from the earliest tip'")
+    nearest = where[where["simulator"] == "whole"].set_index("low_mm")
+    assert list(nearest.index) == [5.0 * n for n in range(9)], "of 40 mm behind the entry"
+    assert (nearest["lead"].drop(40.0) == "clear").all()
+    assert where[where["simulator"] == "short"]["low_mm"].min() == 5.0, "where it lies, not at the tip of the others"
+
+
+def test_a_frame_without_points_in_common_is_left_out() -> None:
+    """It ended the score: zero-size array to reduction operation."""
+
+    def wire(*arc: float) -> dict[tuple[str, int], tuple[str, Array, Array, Array]]:
+        whole = np.arange(5.0, 50.1, 0.5)
+        return {
+            ("c", n): ("c", of, np.full(len(of), 50.0), np.ones(len(of))) for n, of in enumerate((np.array(arc), whole))
+        }
+
+    found = _as_far({"late": wire(5.0, 5.5), "early": wire(2.0)}, ["late", "early"])
+    assert [len(parts) for parts in found.values()] == [1, 1]
+    found = _as_far({"late": wire(5.0, 5.5), "early": wire(2.0)}, ["early"])
+    assert [len(parts) for parts in found.values()] == [1, 2], "of one that is not compared its own is left out"
 
 
 def test_report_makes_every_table_of_a_score_again(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
