@@ -539,9 +539,19 @@ def test_which_file_is_which_frame() -> None:
     assert frames("w1 w2 w4", 4) == {0: "w1", 1: "w2", 3: "w4"}
     assert frames("w10.5 w20.5", 2) == {0: "w10.5", 1: "w20.5"}
     assert frames("a b", 2) == {0: "a", 1: "b"}
+    assert frames("run2.0000 run2.0002", 4) == {0: "run2.0000", 2: "run2.0002"}, "were refused as decimals"
+    assert frames("cath_1.001 cath_1.003", 3) == {0: "cath_1.001", 2: "cath_1.003"}
     depths = "w8.1mm w18.0mm w27.3mm w37.2mm"
     assert [*frames(depths, 4).values()] == depths.split(), "by their last digits they were frames 1, 0, 3 and 2"
-    for names, count in (("w31.0mm w32.1mm w33.2mm", 4), ("w1 w2", 4), ("w0 w7", 4), ("a b", 3), ("w0 w1 w2", 2)):
+    for names, count in (
+        ("w31.0mm w32.1mm w33.2mm", 4),
+        ("w31.000 w32.001", 4),
+        ("w1.00 w1.02", 4),
+        ("w1 w2", 4),
+        ("w0 w7", 4),
+        ("a b", 3),
+        ("w0 w1 w2", 2),
+    ):
         with pytest.raises(LoadError, match="not known which belongs to which"):
             frames(names, count)
 
