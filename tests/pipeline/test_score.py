@@ -28,7 +28,7 @@ from pipeline.run.stages.known import Frame
 from pipeline.run.stages.others import _aside
 from pipeline.simulate.others import begun, not_to_depth, numbered_otherwise, oddity, out_of_order, tightest_bend
 from pipeline.status import InputError
-from pipeline.study.others import named
+from pipeline.study.others import found_for, named
 from reports.export import write_markups_curve, write_polyline_vtp
 from reports.verdict import remarks
 from tests.pipeline.known_study import FRAMES, PEERS, QUICK, Known, errors_of, peers, run_known, simulated, write_csv
@@ -561,6 +561,15 @@ def test_the_other_vtk_layouts(tmp_path: Path) -> None:
     text += "LINES 2 3\nOFFSETS vtktypeint64\n0 3\nCONNECTIVITY vtktypeint64\n2 1 0\n"
     (tmp_path / "a.vtk").write_text(text, encoding="utf-8")
     np.testing.assert_array_equal(read_vtk_points(tmp_path / "a.vtk"), [[1, 2, 0], [1, 0, 0], [0, 0, 0]])
+
+
+@pytest.mark.parametrize("wires", ["other.h5", "other/w0.csv"])
+def test_beside_wires_of_other_cases_a_log_is_no_wire(tmp_path: Path, wires: str) -> None:
+    """Beside other.h5 the log of a crash was refused with exit 2; beside other/w0.csv its frames had failed."""
+    for path in (tmp_path / wires, tmp_path / "bend" / "crash.log"):
+        path.parent.mkdir(exist_ok=True)
+        path.touch()
+    assert found_for("bend", tmp_path, ["bend", "other"]) == []
 
 
 def test_where_curves_are_looked_for(known: Known, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
