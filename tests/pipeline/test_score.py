@@ -425,6 +425,17 @@ def test_a_wire_that_its_own_run_refused_has_failed(known: Known, tmp_path: Path
     assert "frames.h5#1: a joint is turned by" in str(result["failures"])
 
 
+@pytest.mark.parametrize("frame", ['{"stage": "simulate"}', '{"frame": null}', '{"frame": 0, "status": 5}'])
+def test_wires_beside_a_damaged_result_are_refused(known: Known, tmp_path: Path, frame: str) -> None:
+    """A frame without a number was a KeyError; which of the wires its run refused is not known then."""
+    wires = tmp_path / "frames.h5"
+    with h5py.File(wires, "w") as file:
+        file["frames/000/simulated_mm"] = known[1][0]
+    (tmp_path / "result.json").write_text(f'{{"frames": [{frame}]}}', encoding="utf-8")
+    with pytest.raises(LoadError, match=r"result\.json: frames.*of the run again, with --resume"):
+        read_wires([Source(wires)], 1)
+
+
 def test_a_wire_begins_at_the_clamps_plane() -> None:
     """Cut where its base passes it, continued back where it begins behind it; a wire that comes back is cut once."""
     wire = made()
