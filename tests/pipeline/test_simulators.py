@@ -29,6 +29,8 @@ pytestmark = pytest.mark.usefixtures("invented")
 Array = NDArray[np.float64]
 Law = Callable[[Array, Array, np.random.Generator], Array]
 """Errors (n,) at distances from the tip (n,) and depths (n,)."""
+Ends = tuple[float, float, float | None]
+"""A ratio and its interval."""
 CASES, DEPTHS = 6, (20.0, 30.0, 40.0, 50.0)
 
 
@@ -120,6 +122,35 @@ def test_who_is_nearer_is_said_for_the_best_and_every_other_one(compared: Path) 
     alone = [{"simulator": n, "frames": 1, "frames_ok": 1, "rms_mm": mm} for n, mm in (("a", 1.0), ("b", 1.2))]
     told = "a is not shown to be nearer than b: on 1 frame b lies 1.20 times as far from the traced wires (withheld)."
     assert nearer([*alone, row]) == [told]
+
+
+@pytest.mark.parametrize(
+    ("rms", "back", "end"),
+    [
+        (
+            (0.7, 0.6, 0.8),
+            (1.5, 1.2, 1.9),
+            ", but {}1.50 times as far from b (back_ratio; {}1.20 to 1.90): does b end early?",
+        ),
+        (
+            (1.5, 1.2, 1.9),
+            (0.9, 0.7, 1.2),
+            ", but {}0.90 times as far from b (back_ratio; {}0.70 to 1.20): does a end early?",
+        ),
+        ((1.5, 1.2, 1.9), (1.1, 0.9, 1.3), ", and {}1.10 times as far from b (back_ratio; {}0.90 to 1.30)."),
+        ((1.5, 1.2, 1.9), (1.1, 0.9, None), ", and {}1.10 times as far from b (back_ratio)."),
+    ],
+)
+def test_the_other_way_is_told_with_its_interval(rms: Ends, back: Ends, end: str) -> None:
+    """ "but ... does one end early?" was asked also where both ratios were above 1, and who was meant was not said."""
+    row = {"simulator": "b", "against": "a", "common_frames": 5, "interval": "over 6 insertions"}
+    for name, values in (("rms_ratio", rms), ("back_ratio", back)):
+        row |= dict(zip((name, f"{name}_low", f"{name}_high"), values, strict=True))
+    alone = [{"simulator": n, "frames": 5, "frames_ok": 5, "rms_mm": mm} for n, mm in (("a", 1.0), ("b", 1.2))]
+    (said,) = nearer([*alone, row])
+    assert said.startswith("a is not shown to be nearer than b: on 5 frames b lies ")
+    assert " times as far from the traced wires (rms_ratio; 95 % interval " in said
+    assert said.endswith("over 6 insertions)" + end.format("the traced wires lie ", "95 % interval "))
 
 
 def test_a_skill_over_other_frames_than_on_its_own_pages_is_told_apart(tmp_path: Path) -> None:
