@@ -20,7 +20,7 @@ HELD: dict[str, tuple[type[Any], ...]] = {
 """What their keys hold: an object or a list, and what this consists of."""
 ALWAYS = ("result.json", "errors.csv", "frames.h5", "timings.csv", "provenance.json")
 """The files of every case that went through the stages, however far and however well, that is of every ledger."""
-KEYS = {"sweep": ("parameter", "value", "unchanged"), "inputs": ("path", "sha256")}
+KEYS = {"sweep": ("parameter", "value", "unchanged"), "inputs": ("path", "sha256"), "frames": ("frame",)}
 """What each object in such a list names."""
 
 
@@ -49,7 +49,9 @@ def _holds(value: Any, kinds: Sequence[type[Any]], keys: Iterable[str]) -> bool:
     if not isinstance(value, kinds[0]):
         return False
     inside: Iterable[Any] = value.values() if isinstance(value, dict) else value
-    return len(kinds) == 1 or all(_holds(one, kinds[1:], ()) and all(key in one for key in keys) for one in inside)
+    return len(kinds) == 1 or all(
+        _holds(one, kinds[1:], ()) and all(one.get(key) is not None for key in keys) for one in inside
+    )
 
 
 def damaged_records(out_dir: Path) -> list[str]:

@@ -189,11 +189,27 @@ def _beside(row: Mapping[Any, Any]) -> str:
     closer = high < 1.0 and (math.isnan(back[0]) or back[2] < 1.0)
     head = f"{other} is nearer than {one}" if farther else f"{one} is nearer than {other}" if closer else ""
     head = head or f"{other} is not shown to be nearer than {one}"
-    known = f"95 % interval {low:.2f} to {high:.2f}; {row['interval']}" if low <= high else str(row["interval"])
-    where = counted(int(row["common_frames"]), "frame")
-    said = f"{head}: on {where} {one} lies {value:.2f} times as far from the traced wires ({known.rstrip('; ')})"
     one_way = (low > 1.0 or high < 1.0) and not (farther or closer)
-    return said + f", but these {back[0]:.2f} times as far from it: does one end early?" * one_way + "." * (not one_way)
+    known = "; ".join(filter(None, ("rms_ratio" * one_way, _interval(low, high), str(row["interval"]))))
+    where = counted(int(row["common_frames"]), "frame")
+    said = f"{head}: on {where} {one} lies {value:.2f} times as far from the traced wires ({known})"
+    return said + (_the_other_way(one, other, value, back) if one_way else ".")
+
+
+def _the_other_way(one: str, other: str, value: float, back: tuple[float, float, float]) -> str:
+    """The end of a sentence of which the ratio ``value`` of rms_mm is told, and that of back_rms_mm does not bear out.
+
+    Of two that lie to either side of 1 the one that is nearer by rms_mm may owe it to what its wires leave out.
+    """
+    early = one if value < 1.0 < back[0] else other if back[0] < 1.0 < value else ""
+    told = "; ".join(filter(None, ("back_ratio", _interval(*back[1:]))))
+    said = f", {'but' if early else 'and'} the traced wires lie {back[0]:.2f} times as far from {one} ({told})"
+    return said + (f": does {early} end early?" if early else ".")
+
+
+def _interval(low: float, high: float) -> str:
+    """An interval in words; empty where it has no two ends."""
+    return f"95 % interval {low:.2f} to {high:.2f}" if low <= high else ""
 
 
 def _with_ends(row: Mapping[Any, Any], name: str) -> tuple[float, float, float]:

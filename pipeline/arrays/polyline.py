@@ -11,11 +11,15 @@ from pipeline.model import Array, arc_length
 
 SAME_MM = 1e-6
 """Arc lengths closer than this are one."""
-UNITS_MM = {
-    "mm": 1.0, "millimeter": 1.0, "millimetre": 1.0, "millimeters": 1.0, "um": 1e-3, "µm": 1e-3, "μm": 1e-3,
-    "micron": 1e-3, "microns": 1e-3, "micrometer": 1e-3, "cm": 10.0, "inch": 25.4, "inches": 25.4, "m": 1e3,
-    "meter": 1e3, "metre": 1e3, "meters": 1e3, "nm": 1e-6,
-}  # fmt: skip
+_SPELLED = {
+    1.0: "mm millimeter millimetre millimeters millimetres",
+    1e-3: "um µm μm micron microns micrometer micrometre micrometers micrometres",
+    10.0: "cm centimeter centimetre centimeters centimetres",
+    25.4: "inch inches in",
+    1e3: "m meter metre meters metres",
+    1e-6: "nm nanometer nanometre nanometers nanometres",
+}
+UNITS_MM = {name: factor for factor, names in _SPELLED.items() for name in names.split()}
 """Units of length as files name them."""
 MISTAKEN = ("mm", "cm", "inch", "m", "µm")
 """Units in which a length may have been given by mistake."""

@@ -9,7 +9,10 @@ from pipeline.load.geometry import refused, unusable
 from pipeline.load.surfaces import SPACE, named_space, space_of
 
 HEAD = 4096  # bytes of a file of 3D Slicer or VTK in which it says what it is
-_UNIT = re.compile(r"(?:units?|coordinateUnits)\"?\s*[:=,]\s*\"?([A-Za-zµμ]+)|lengths in (\w+)", re.IGNORECASE)
+_UNIT = re.compile(
+    r"(?:units?|coordinateUnits)\"?\s*[:=,]\s*\"?(?:in[ \t]+)?([A-Za-zµμ]+)|lengths in (\w+)", re.IGNORECASE
+)
+"""A word before the unit may be a preposition: "in mm" is no inch."""
 _SPACE_OF = re.compile(
     r"(?<![a-z])(?:(?:space|coordinate[ _-]?system)\"?\s*[:=,]\s*\"?([a-z]\w*)"
     r"|(?:coordinates|orientation|axes)\"?\s*[:=,]\s*\"?([RLAPSI]{3})\b)",

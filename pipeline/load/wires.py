@@ -23,7 +23,7 @@ from pipeline.load.surfaces import RAS_TO_LPS
 from pipeline.load.tables import rows_of
 from pipeline.load.vtk import read_vtk_points
 from pipeline.model import Array
-from reports import records
+from reports.result_file import read_result
 from reports.texts import UnreadableError
 
 OF_KIND = {**READERS, ".vtk": read_vtk_points}
@@ -129,11 +129,11 @@ def _refused_beside(wires: Path) -> dict[int, tuple[str, ...]]:
     if wires.name != "frames.h5":
         return {}
     try:
-        frames = records.read_json(wires.with_name("result.json")).get("frames", [])
+        frames = read_result(wires.with_name("result.json")).get("frames", [])
     except UnreadableError as error:
         raise LoadError(str(error)) from None
     why = ("status", "sentence", "message")
-    return {f["frame"]: tuple(f.get(key, "") for key in why) for f in frames if f.get("stage") == "simulate"}
+    return {f["frame"]: tuple(f.get(key) or "" for key in why) for f in frames if f.get("stage") == "simulate"}
 
 
 def _by_number(path: Path, frames: h5py.Group) -> dict[int, h5py.Group]:

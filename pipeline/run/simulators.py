@@ -149,13 +149,15 @@ def _alone(name: str, found: Sequence[Found], common: Frames, judged: bool) -> d
 
 
 def _where(folders: Mapping[str, Path], judged: Studies, common: Frames, off: Off) -> Iterator[dict[str, Any]]:
-    """For each bin of the distance from the tip and of the depth, every simulator's error and who is nearest.
+    """For each bin of the distance from the earliest tip and of the depth, every simulator's error and who is nearest.
 
     off : simulators whose tips lie off, or that were made from the traces: distances to the traced wire do not show
-    that, so these are never the nearest.     judged : those that have all ``common`` frames.
+    that, so these are never the nearest, and where they have no part others are compared all the same.     judged :
+    those that have all ``common`` frames.
     """
-    points = _as_far({name: dict(_points(folders[name], found, common)) for name, found in judged.items()})
-    for along, place in (("distance from the tip", 1), ("insertion depth", 2)):
+    compared = [name for name in judged if name not in off] or list(judged)
+    points = _as_far({name: dict(_points(folders[name], found, common)) for name, found in judged.items()}, compared)
+    for along, place in (("distance from the earliest tip", 1), ("insertion depth", 2)):
         values = [np.max(part[place]) for parts in points.values() for part in parts]
         if not values:
             return
@@ -163,30 +165,37 @@ def _where(folders: Mapping[str, Path], judged: Studies, common: Frames, off: Of
         for number in range(int(max(values) / step) + 1):
             low, high = number * step, (number + 1) * step
             found = {name: _pieces(parts, place, low, high) for name, parts in points.items()}
-            if all(found.values()):
-                yield from _rows({"along": along, "low_mm": low, "high_mm": high}, found, off)
+            if all(found[name] for name in compared):
+                here = {name: pieces for name, pieces in found.items() if pieces}
+                yield from _rows({"along": along, "low_mm": low, "high_mm": high}, here, off)
 
 
 Part = tuple[str, Array, Array, Array]
-"""One frame: its insertion, distances from the tip (n,), its depth n times (n,), errors (n,); mm."""
+"""One frame: its insertion, distances from the earliest tip (n,), its depth n times (n,), errors (n,); mm."""
 Key = tuple[str, int]
 
 
-def _as_far(points: Mapping[str, Mapping[Key, Part]]) -> dict[str, list[Part]]:
-    """Each simulator's frames as far as all reach, counted back from there; ``points`` have arc lengths instead.
+def _as_far(points: Mapping[str, Mapping[Key, Part]], compared: Sequence[str]) -> dict[str, list[Part]]:
+    """Each simulator's frames as far as all ``compared`` reach, counted back from there; ``points`` have arc lengths.
 
-    Counted from its own tip, a wire that ends 2 mm early, before the error grows, had the lead at the tip.
+    Counted from its own tip, a wire that ends 2 mm early, before the error grows, had the lead at the tip. A frame in
+    which one of these has no point so far in is left out.
     """
-    ends = {
-        key: min(float(parts[key][1].max()) for parts in points.values()) for key in next(iter(points.values()), {})
-    }
-    kept: dict[str, list[Part]] = {}
-    for name, parts in points.items():
-        kept[name] = []
-        for key, (insertion, arc, depth, error) in parts.items():
-            use = arc <= ends[key] + SAME_END_MM
-            kept[name].append((insertion, arc[use].max() - arc[use], depth[use], error[use]))
+    kept: dict[str, list[Part]] = {name: [] for name in points}
+    for key in next(iter(points.values()), {}):
+        end = min(float(points[name][key][1].max()) for name in compared)
+        parts = {name: _up_to(end, of[key]) for name, of in points.items()}
+        if all(len(parts[name][1]) for name in compared):
+            for name, part in parts.items():
+                kept[name] += [part] * bool(len(part[1]))
     return kept
+
+
+def _up_to(end_mm: float, part: Part) -> Part:
+    """The points of a frame up to an arc length, from which they are counted back."""
+    insertion, arc, depth, error = part
+    use = arc <= end_mm + SAME_END_MM
+    return insertion, np.maximum(end_mm - arc[use], 0.0), depth[use], error[use]
 
 
 def _points(folder: Path, found: Sequence[Found], common: Frames) -> Iterator[tuple[Key, Part]]:

@@ -73,8 +73,9 @@ def found_for(case: str, place: Path, cases: Sequence[str]) -> list[str]:
 
 
 def _wires_in(place: Path) -> list[Path]:
-    """The files of a folder that are read as wires."""
-    return [path for path in place.iterdir() if path.is_file() and kind_of(path)] if is_folder(place) else []
+    """The files of a folder that are read as wires; a file that is read so is all there is."""
+    paths = place.iterdir() if is_folder(place) else [place]
+    return [path for path in paths if path.is_file() and kind_of(path)]
 
 
 def _places(case: str, place: Path) -> list[Path]:

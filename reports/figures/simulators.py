@@ -39,7 +39,7 @@ def colours(names: "pd.Series[str]") -> dict[str, str]:
 
 
 def who_is_nearest(files: SimulatorFiles) -> Drawing | None:
-    """Error in bins of the distance from the tip and of the depth; a strip below with the colour of the nearest."""
+    """Error in bins of the distance from the earliest tip and of the depth; below, the colour of the nearest."""
     where = files.where
     if where.empty:
         return None

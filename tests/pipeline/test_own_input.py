@@ -273,6 +273,25 @@ def test_a_table_says_its_space_and_unit(tmp_path, said, turned, factor):
     np.testing.assert_allclose(read_curve(tmp_path / "a.csv").points_mm, points * factor * [turned, turned, 1])
 
 
+@pytest.mark.parametrize(
+    ("unit", "factor"),
+    [
+        ("in", 25.4),
+        ("Micrometre", 1e-3),
+        ("micrometers", 1e-3),
+        ("centimeters", 10.0),
+        ("millimetres", 1.0),
+        ("in mm", 1.0),
+    ],
+)
+def test_units_are_known_by_their_usual_spellings(tmp_path: Path, unit: str, factor: float) -> None:
+    """Of these "in" and most with -metre were refused; "in mm" is no inch."""
+    (tmp_path / "a.csv").write_text(f"# space: LPS\n# unit: {unit}\nx,y,z\n1,2,3\n4,5,6\n", encoding="utf-8")
+    (read,) = read_wires([Source(tmp_path / "a.csv")], 1)
+    assert read.problem == ""
+    np.testing.assert_allclose(read.points_mm, factor * np.array([[1, 2, 3], [4, 5, 6]]))
+
+
 BOM = "\N{ZERO WIDTH NO-BREAK SPACE}"
 LONG = "# made by a program that says much of itself\n" * 200
 

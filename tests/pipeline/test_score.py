@@ -28,7 +28,7 @@ from pipeline.run.stages.known import Frame
 from pipeline.run.stages.others import _aside
 from pipeline.simulate.others import begun, not_to_depth, numbered_otherwise, oddity, out_of_order, tightest_bend
 from pipeline.status import InputError
-from pipeline.study.others import named
+from pipeline.study.others import found_for, named
 from reports.export import write_markups_curve, write_polyline_vtp
 from reports.verdict import remarks
 from tests.pipeline.known_study import FRAMES, PEERS, QUICK, Known, errors_of, peers, run_known, simulated, write_csv
@@ -425,6 +425,17 @@ def test_a_wire_that_its_own_run_refused_has_failed(known: Known, tmp_path: Path
     assert "frames.h5#1: a joint is turned by" in str(result["failures"])
 
 
+@pytest.mark.parametrize("frame", ['{"stage": "simulate"}', '{"frame": null}', '{"frame": 0, "status": 5}'])
+def test_wires_beside_a_damaged_result_are_refused(known: Known, tmp_path: Path, frame: str) -> None:
+    """A frame without a number was a KeyError; which of the wires its run refused is not known then."""
+    wires = tmp_path / "frames.h5"
+    with h5py.File(wires, "w") as file:
+        file["frames/000/simulated_mm"] = known[1][0]
+    (tmp_path / "result.json").write_text(f'{{"frames": [{frame}]}}', encoding="utf-8")
+    with pytest.raises(LoadError, match=r"result\.json: frames.*of the run again, with --resume"):
+        read_wires([Source(wires)], 1)
+
+
 def test_a_wire_begins_at_the_clamps_plane() -> None:
     """Cut where its base passes it, continued back where it begins behind it; a wire that comes back is cut once."""
     wire = made()
@@ -539,9 +550,19 @@ def test_which_file_is_which_frame() -> None:
     assert frames("w1 w2 w4", 4) == {0: "w1", 1: "w2", 3: "w4"}
     assert frames("w10.5 w20.5", 2) == {0: "w10.5", 1: "w20.5"}
     assert frames("a b", 2) == {0: "a", 1: "b"}
+    assert frames("run2.0000 run2.0002", 4) == {0: "run2.0000", 2: "run2.0002"}, "were refused as decimals"
+    assert frames("cath_1.001 cath_1.003", 3) == {0: "cath_1.001", 2: "cath_1.003"}
     depths = "w8.1mm w18.0mm w27.3mm w37.2mm"
     assert [*frames(depths, 4).values()] == depths.split(), "by their last digits they were frames 1, 0, 3 and 2"
-    for names, count in (("w31.0mm w32.1mm w33.2mm", 4), ("w1 w2", 4), ("w0 w7", 4), ("a b", 3), ("w0 w1 w2", 2)):
+    for names, count in (
+        ("w31.0mm w32.1mm w33.2mm", 4),
+        ("w31.000 w32.001", 4),
+        ("w1.00 w1.02", 4),
+        ("w1 w2", 4),
+        ("w0 w7", 4),
+        ("a b", 3),
+        ("w0 w1 w2", 2),
+    ):
         with pytest.raises(LoadError, match="not known which belongs to which"):
             frames(names, count)
 
@@ -551,6 +572,15 @@ def test_the_other_vtk_layouts(tmp_path: Path) -> None:
     text += "LINES 2 3\nOFFSETS vtktypeint64\n0 3\nCONNECTIVITY vtktypeint64\n2 1 0\n"
     (tmp_path / "a.vtk").write_text(text, encoding="utf-8")
     np.testing.assert_array_equal(read_vtk_points(tmp_path / "a.vtk"), [[1, 2, 0], [1, 0, 0], [0, 0, 0]])
+
+
+@pytest.mark.parametrize("wires", ["other.h5", "other/w0.csv"])
+def test_beside_wires_of_other_cases_a_log_is_no_wire(tmp_path: Path, wires: str) -> None:
+    """Beside other.h5 the log of a crash was refused with exit 2; beside other/w0.csv its frames had failed."""
+    for path in (tmp_path / wires, tmp_path / "bend" / "crash.log"):
+        path.parent.mkdir(exist_ok=True)
+        path.touch()
+    assert found_for("bend", tmp_path, ["bend", "other"]) == []
 
 
 def test_where_curves_are_looked_for(known: Known, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

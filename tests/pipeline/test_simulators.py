@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from pipeline.cli import main
 from pipeline.run.overall import found_cases, overall, ratio
-from pipeline.run.simulators import OF_SKILL, Piece, _rows, side_by_side, write_comparison
+from pipeline.run.simulators import OF_SKILL, Piece, _as_far, _rows, side_by_side, write_comparison
 from pipeline.run.stages import others
 from pipeline.run.stages.known import Known
 from reports import tables
@@ -29,6 +29,8 @@ pytestmark = pytest.mark.usefixtures("invented")
 Array = NDArray[np.float64]
 Law = Callable[[Array, Array, np.random.Generator], Array]
 """Errors (n,) at distances from the tip (n,) and depths (n,)."""
+Ends = tuple[float, float, float | None]
+"""A ratio and its interval."""
 CASES, DEPTHS = 6, (20.0, 30.0, 40.0, 50.0)
 
 
@@ -122,6 +124,35 @@ def test_who_is_nearer_is_said_for_the_best_and_every_other_one(compared: Path) 
     assert nearer([*alone, row]) == [told]
 
 
+@pytest.mark.parametrize(
+    ("rms", "back", "end"),
+    [
+        (
+            (0.7, 0.6, 0.8),
+            (1.5, 1.2, 1.9),
+            ", but {}1.50 times as far from b (back_ratio; {}1.20 to 1.90): does b end early?",
+        ),
+        (
+            (1.5, 1.2, 1.9),
+            (0.9, 0.7, 1.2),
+            ", but {}0.90 times as far from b (back_ratio; {}0.70 to 1.20): does a end early?",
+        ),
+        ((1.5, 1.2, 1.9), (1.1, 0.9, 1.3), ", and {}1.10 times as far from b (back_ratio; {}0.90 to 1.30)."),
+        ((1.5, 1.2, 1.9), (1.1, 0.9, None), ", and {}1.10 times as far from b (back_ratio)."),
+    ],
+)
+def test_the_other_way_is_told_with_its_interval(rms: Ends, back: Ends, end: str) -> None:
+    """ "but ... does one end early?" was asked also where both ratios were above 1, and who was meant was not said."""
+    row = {"simulator": "b", "against": "a", "common_frames": 5, "interval": "over 6 insertions"}
+    for name, values in (("rms_ratio", rms), ("back_ratio", back)):
+        row |= dict(zip((name, f"{name}_low", f"{name}_high"), values, strict=True))
+    alone = [{"simulator": n, "frames": 5, "frames_ok": 5, "rms_mm": mm} for n, mm in (("a", 1.0), ("b", 1.2))]
+    (said,) = nearer([*alone, row])
+    assert said.startswith("a is not shown to be nearer than b: on 5 frames b lies ")
+    assert " times as far from the traced wires (rms_ratio; 95 % interval " in said
+    assert said.endswith("over 6 insertions)" + end.format("the traced wires lie ", "95 % interval "))
+
+
 def test_a_skill_over_other_frames_than_on_its_own_pages_is_told_apart(tmp_path: Path) -> None:
     """One simulator had two skills, over 8 and over 6 frames, by the same name."""
     lost = tuple((case, 1) for case in range(CASES))
@@ -198,7 +229,7 @@ def test_who_failed_frames_stands_below_who_did_not(tmp_path: Path) -> None:
 
 def test_who_is_nearest_where(compared: Path) -> None:
     where = pd.read_csv(compared / "where.csv")
-    lead = where[where["lead"].notna() & (where["along"] == "distance from the tip")].set_index("low_mm")
+    lead = where[where["lead"].notna() & (where["along"] == "distance from the earliest tip")].set_index("low_mm")
     assert dict(lead["simulator"]) == {0.0: "tip", 5.0: "tip", 10.0: "tip"} | dict.fromkeys(
         (15.0, 20.0, 25.0, 30.0, 35.0, 40.0), "wireval"
     )
@@ -269,12 +300,42 @@ def test_a_wire_that_ends_early_is_not_nearer_than_the_whole_one(tmp_path: Path,
     assert pair["rms_ratio_high"].item() < 1.0 < pair["back_ratio_low"].item()
     assert not any(line.startswith("early is nearer") for line in said)
     assert alone.set_index("simulator").loc["early", "tip_max_mm"] == early_mm
-    where = pd.read_csv(tmp_path / "where.csv").query("simulator == 'early' and along == 'distance from the tip'")
+    where = pd.read_csv(tmp_path / "where.csv").query(
+        "simulator == 'early' and along == 'distance from the earliest tip'"
+    )
     assert set(where["lead"].dropna()) <= {"tie", "the tips lie off"}
     shown = render_simulators(tmp_path).read_text(encoding="utf-8")
     assert shown.index(">whole<") < shown.index(">early<"), "in the table"
     assert bool(remarks(overall(found_cases(early)))) == (back > 2.0)
     assert "is better" not in ratio(found_cases(whole), found_cases(early)).verdict()  # type: ignore[union-attr]
+
+
+def test_a_short_wire_that_is_off_shortens_no_comparison(tmp_path: Path) -> None:
+    """Of wires to 50 mm the last 7 mm before 12 mm were compared, since one that may not be the nearest ended there."""
+    whole = write_tree(tmp_path / "whole", even(0.2))
+    short = cut(whole, tmp_path / "short", 9.5, (0, 1, 2, 3), 3.0)
+    other = write_tree(tmp_path / "other", even(0.3))
+    write_comparison(tmp_path, {"short": short, "other": other, "whole": whole})
+    where = pd.read_csv(tmp_path / "where.csv").query("along == 'distance from the earliest tip'")
+    nearest = where[where["simulator"] == "whole"].set_index("low_mm")
+    assert list(nearest.index) == [5.0 * n for n in range(9)], "of 40 mm behind the entry"
+    assert (nearest["lead"].drop(40.0) == "clear").all()
+    assert where[where["simulator"] == "short"]["low_mm"].min() == 5.0, "where it lies, not at the tip of the others"
+
+
+def test_a_frame_without_points_in_common_is_left_out() -> None:
+    """It ended the score: zero-size array to reduction operation."""
+
+    def wire(*arc: float) -> dict[tuple[str, int], tuple[str, Array, Array, Array]]:
+        whole = np.arange(5.0, 50.1, 0.5)
+        return {
+            ("c", n): ("c", of, np.full(len(of), 50.0), np.ones(len(of))) for n, of in enumerate((np.array(arc), whole))
+        }
+
+    found = _as_far({"late": wire(5.0, 5.5), "early": wire(2.0)}, ["late", "early"])
+    assert [len(parts) for parts in found.values()] == [1, 1]
+    found = _as_far({"late": wire(5.0, 5.5), "early": wire(2.0)}, ["early"])
+    assert [len(parts) for parts in found.values()] == [1, 2], "of one that is not compared its own is left out"
 
 
 def test_report_makes_every_table_of_a_score_again(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -341,7 +341,7 @@ def test_lines_of_simulators_that_coincide_are_all_seen() -> None:
     """Of two the same one alone was seen where their gaps fell together, and marks hid each other."""
     rows = [
         {"along": along, "simulator": name, "low_mm": low, "high_mm": low + 5.0, "rms_mm": 0.1, "lead": None}
-        for along in ("distance from the tip", "insertion depth")
+        for along in ("distance from the earliest tip", "insertion depth")
         for name in ("a", "b", "c")
         for low in (0.0, 5.0)
     ]

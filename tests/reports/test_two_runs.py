@@ -14,7 +14,7 @@ import pytest
 
 from pipeline import cli
 from pipeline.run import ledger
-from pipeline.run.overall import Ratio
+from pipeline.run.ratio import Ratio
 from reports import tables
 from reports.doubts import MADE_FROM_TRACES
 from reports.junit import Outcome, write_junit
@@ -498,6 +498,17 @@ def test_larger_than_is_allowed_and_not_shown_to_be() -> None:
     """Said to be larger "by no more than is allowed"."""
     assert "whether by more than is allowed (ratio 1.05) is not shown" in Ratio(1.11, 1.04, 1.2, 5, "").verdict(1.05)
     assert "by no more than is allowed" in Ratio(1.04, 1.01, 1.08, 5, "").verdict(1.05)
+
+
+def test_nearer_one_way_alone_is_said_with_both_intervals() -> None:
+    """An interval of 0.7 to 0.9 stood there, and "no difference is shown"."""
+    said = Ratio(0.8, 0.7, 0.9, 5, "over 6 insertions", (1.1, 0.95, 1.3)).verdict()
+    assert "no difference" not in said
+    assert said.endswith(
+        "0.800 (95 %: 0.700 to 0.900, over 6 insertions): the second is nearer by rms_mm, and not shown to be nearer "
+        "the other way, from the traced wires (back_rms_mm 1.100 times as large, 95 %: 0.950 to 1.300, over 6 "
+        "insertions): does it end early?"
+    )
 
 
 def test_a_table_of_markdown_keeps_its_columns(first: Path) -> None:
