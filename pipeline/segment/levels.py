@@ -24,9 +24,10 @@ BOXES_MM = 6.0, 10.0, 17.0, 30.0
 carotid artery and what is around it, up to an aorta, of which the first holds nothing but its own noise."""
 LEAST_BOX = 8
 """Its least half width in voxels."""
-EDGE, APART, TWO_GREYS = 0.25, 0.5, 4.5
+EDGE, APART, TWO_GREYS, WIDE = 0.25, 1.0, 4.5, 0.2
 """Share of the contrast below the seed's grey from which a voxel is not the vessel's. Then how far apart two greys
-around it are: over the brighter one's distance from the vessel, and over their spread."""
+around it are: over the brighter one's distance from the vessel, and over their spread; and the least share of the box
+that the brighter one fills: medium that has settled is a vessel's second grey, and must be none that surrounds it."""
 LEAST_DARK = 0.05
 """Least share of the box that lies off the vessel, two voxels from anything as bright."""
 THICK = 5.0
@@ -107,7 +108,7 @@ def _surroundings(grey: NDArray[Any], seed: float) -> tuple[float, float]:
     """A first guess of what surrounds the vessel, and the grey below which voxels are no part of that.
 
     Of two well apart it is the brighter: the other may be air, or what lies beyond a round field of view. They are
-    apart by Ashman's D, as two greys of a vessel are, and by half of what the brighter one is from the vessel.
+    apart by Ashman's D, as two greys of a vessel are, and by as much as the brighter one is from the vessel.
     """
     darkest = float(np.percentile(grey, 10))
     clear = ~ndimage.binary_dilation(grey > seed - EDGE * (seed - darkest), iterations=2)
@@ -118,7 +119,7 @@ def _surroundings(grey: NDArray[Any], seed: float) -> tuple[float, float]:
     low, high = dark[dark <= limit], dark[dark > limit]
     wide = float(np.hypot(spread(low), spread(high))) / np.sqrt(2.0)
     bottom, top = float(np.median(low)), float(np.median(high))
-    if high.size < LEAST_DARK * grey.size or top - bottom < max(TWO_GREYS * wide, APART * (seed - top)):
+    if high.size < WIDE * grey.size or top - bottom < max(TWO_GREYS * wide, APART * (seed - top)):
         return darkest, -np.inf
     return top, 0.5 * (bottom + top)
 

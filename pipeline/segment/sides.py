@@ -131,13 +131,8 @@ def sides_of(
     if levels.foreign:  # with bone or metal in it, nobody can tell; that is said by itself
         return None
     along = _Wall(scan, distance, corner, levels, *wall)
-    filled, around = _filled(along, wire), _around_it(along)
-    if filled is None:
-        return around
-    if around is None:
-        return filled
-    near = around.places.query(filled.places.data)[1]
-    return replace(filled, outside=around.outside[near], around=around.around)
+    # a fainter layer of medium looks like tissue from inside the other: where there is one, nothing is asked of outside
+    return _filled(along, wire) or _around_it(along)
 
 
 def _filled(wall: _Wall, wire: bool) -> Sides | None:
