@@ -57,11 +57,7 @@ REFUSED = [
     ("dim distal part, x 0.15 to 0.2", 463, "TRACE_AMBIGUOUS"),  # 2.4 voxels too short, the same
     ("dim distal part, x 0.15 to 0.2", 552, "TRACE_AMBIGUOUS"),  # 2.6 voxels too long, the same
     ("dim distal part, x 0.15 to 0.2", 645, "TRACE_AMBIGUOUS"),  # cut by 6 mm of wire 1.7 noises bright, and ok
-    (
-        "dim distal part, x 0.15 to 0.2",
-        557,
-        "TRACE_AMBIGUOUS",
-    ),  # 13 mm of 1.2 noises; 556 is missed
+    ("dim distal part, x 0.15 to 0.2", 557, "TRACE_AMBIGUOUS"),  # 13 mm of 1.2 noises; 556 is missed
     ("two wires 0.8 mm apart", 635, "TRACE_AMBIGUOUS"),  # first the other one, and ok: wide crests merge them
     ("two wires 0.8 mm apart", 805, "TRACE_AMBIGUOUS"),  # along one and back along the other, and ok
     ("a longer device 0.4 to 0.6 mm beside the wire", 5, "TRACE_AMBIGUOUS"),  # to the other's tip, and ok
