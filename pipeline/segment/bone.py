@@ -7,10 +7,10 @@ out, or there is none. What is hardly brighter has no such limit; it is told by 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
-from skimage.filters import threshold_otsu
 
-from pipeline.arrays.grids import indices_of, spread
+from pipeline.arrays.grids import indices_of
 from pipeline.segment.contact import Contact, how_many, named
+from pipeline.segment.groups import two_groups
 from pipeline.segment.levels import BRIGHTER, GreyLevels, Index, box_from, grey_around
 from solver.grid import Grid
 
@@ -26,10 +26,8 @@ DEEP = 2.0
 """Blurs below the wall from which the grey there is the plateau's: 2 % are missing."""
 LOOKED_AT, LEAST = 20_000, 100
 """Deep voxels that are looked at, and the least that tell anything."""
-APART, GAP = 4.5, 0.08
-"""Ashman's D of two groups of greys, and the share of the contrast between them, above which they are two plateaus. A
-vessel has D up to 3.5 in 152 tempting scenes without bone (seeds 1200 to 1203), whatever the noise, also around a wire
-and where the medium settles or decays; with bone 1.11 to 1.13 times as bright, at a contrast of 8 noises, 5 to 6."""
+GAP = 0.08
+"""Least share of the contrast between two groups of greys that are two plateaus, apart by Ashman's D as well."""
 
 
 def touching(scan: Grid, distance: Grid, corner: Index, levels: GreyLevels) -> tuple[str, ...]:
@@ -77,8 +75,7 @@ def _places(bright: NDArray[np.bool_], at_wall: NDArray[np.bool_]) -> list[tuple
 def two_greys(scan: Grid, distance: Grid, corner: Index, levels: GreyLevels, blur_mm: float) -> tuple[str, ...]:
     """One sentence for the report where the vessel has two greys, well apart, or none.
 
-    The deep voxels are split by Otsu's threshold and judged by the distance of the two groups over their spread (Ashman
-    et al. 1994, Astron. J. 108, 2348). blur_mm : the wall's.
+    The deep voxels are split and judged by ``two_groups``. blur_mm : the wall's.
     """
     deep = indices_of(distance.values < -DEEP * blur_mm)
     deep = deep[:: max(1, len(deep) // LOOKED_AT)]
@@ -87,12 +84,8 @@ def two_greys(scan: Grid, distance: Grid, corner: Index, levels: GreyLevels, blu
     grey = (grey_around(scan, deep + corner) - levels.outside) / levels.contrast
     kept = grey < BRIGHTER * np.median(grey)  # what is brighter is looked for by ``touching``, and may be a wire
     deep, grey = deep[kept], grey[kept]
-    bright = grey > threshold_otsu(grey)
-    if not bright.any():  # all alike, as without noise
-        return ()
-    low, high = (float(np.median(group)) for group in (grey[~bright], grey[bright]))
-    wide = float(np.hypot(spread(grey[~bright]), spread(grey[bright]))) / np.sqrt(2.0)
-    if high - low < max(GAP, APART * wide):
+    bright, low, high, apart = two_groups(grey)
+    if not high - low >= max(GAP, apart):
         return ()
     at = [round(float(x), 1) for x in distance.to_mm(np.median(deep[bright], axis=0))]
     share, more = 100 * np.mean(bright), 100 * (high / low - 1)

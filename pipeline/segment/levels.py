@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import ndimage
 from scipy.special import chndtr
-from skimage.filters import threshold_otsu
 
-from pipeline.arrays.grids import spread, unflattened
+from pipeline.arrays.grids import unflattened
 from pipeline.model import Counters
 from pipeline.segment._kernels.voxels import rebased
+from pipeline.segment.groups import two_groups
 from pipeline.segment.noise import noise_left, smoothed, voxel_noise
 from pipeline.status import FrameStatus, StageError
 from solver.grid import Grid
@@ -24,10 +24,10 @@ BOXES_MM = 6.0, 10.0, 17.0, 30.0
 carotid artery and what is around it, up to an aorta, of which the first holds nothing but its own noise."""
 LEAST_BOX = 8
 """Its least half width in voxels."""
-EDGE, APART, TWO_GREYS, WIDE = 0.25, 1.0, 4.5, 0.2
+EDGE, APART, WIDE = 0.25, 1.0, 0.2
 """Share of the contrast below the seed's grey from which a voxel is not the vessel's. Then how far apart two greys
-around it are: over the brighter one's distance from the vessel, and over their spread; and the least share of the box
-that the brighter one fills: medium that has settled is a vessel's second grey, and must be none that surrounds it."""
+around it are, over the brighter one's distance from the vessel, and the least share of the box that the brighter one
+fills: medium that has settled is a vessel's second grey, and must be none that surrounds it."""
 LEAST_DARK = 0.05
 """Least share of the box that lies off the vessel, two voxels from anything as bright."""
 THICK = 5.0
@@ -113,13 +113,10 @@ def _surroundings(grey: NDArray[Any], seed: float) -> tuple[float, float]:
     darkest = float(np.percentile(grey, 10))
     clear = ~ndimage.binary_dilation(grey > seed - EDGE * (seed - darkest), iterations=2)
     dark = grey[clear]
-    if dark.size < LEAST_DARK * grey.size or np.ptp(dark) == 0.0:
+    if dark.size < LEAST_DARK * grey.size:
         return darkest, -np.inf
-    limit = float(threshold_otsu(dark))
-    low, high = dark[dark <= limit], dark[dark > limit]
-    wide = float(np.hypot(spread(low), spread(high))) / np.sqrt(2.0)
-    bottom, top = float(np.median(low)), float(np.median(high))
-    if high.size < WIDE * grey.size or top - bottom < max(TWO_GREYS * wide, APART * (seed - top)):
+    bright, bottom, top, apart = two_groups(dark)
+    if np.count_nonzero(bright) < WIDE * grey.size or not top - bottom >= max(apart, APART * (seed - top)):
         return darkest, -np.inf
     return top, 0.5 * (bottom + top)
 

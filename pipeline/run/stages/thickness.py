@@ -44,10 +44,8 @@ def too_thin(frames: Sequence[Frame], lumen: Lumen, radius_mm: float) -> list[st
 
 def not_too_thick(curve: Curve, lumen: Lumen, radius_mm: float) -> Curve:
     """The curve; ambiguous where its line is too thick for a wire of this radius: a rod, a catheter, another wire."""
-    seen, voxel = (
-        _seen_radius_mm(curve.levels.get("blur_mm", float("nan")), lumen, SHARPEST_VOXELS),
-        float(np.min(lumen.distance.spacing_mm)),
-    )
+    voxel = float(np.min(lumen.distance.spacing_mm))
+    seen = _seen_radius_mm(curve.levels.get("blur_mm", float("nan")), lumen, SHARPEST_VOXELS)
     most = max(MOST_SHARE * radius_mm, radius_mm + MORE_VOXELS * voxel)
     if curve.length_mm < SHORTEST_VOXELS * voxel:
         return curve
