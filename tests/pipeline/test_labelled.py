@@ -90,6 +90,16 @@ def test_a_map_without_a_wall_is_refused(share: float) -> None:
     assert error.value.status is FrameStatus.SEGMENT_FAILED
 
 
+@pytest.mark.parametrize("voxels", [1, 2, 9, 24])
+def test_probabilities_of_a_few_voxels_are_refused(voxels: int) -> None:
+    """Below 26 voxels the list of neighbours was written beyond its end: the process died of it, or later."""
+    shares = np.zeros((12, 12, 30))
+    shares[5, 5, 3 : 3 + voxels] = 0.6
+    with pytest.raises(StageError, match="got no place where") as error:
+        given_lumen(Volume(shares, np.ones(3), np.zeros(3)), SegmentConfig())
+    assert error.value.status is FrameStatus.SEGMENT_FAILED
+
+
 def test_a_branch_as_thin_as_a_voxel_stays() -> None:
     """There was none: "the vessel is thinner than its blur"."""
     lumen = lumen_of(distance_from([line(OBLIQUE, 20.0)], 1.0, np.ones(3)))

@@ -119,7 +119,7 @@ def dilate(mask: NDArray[Any], order: NDArray[Any], layers: int, first: int) -> 
     for layer in range(layers):
         stop = count
         for n in range(begin, stop):
-            if count + steps.shape[0] > found.shape[0]:
+            while count + steps.shape[0] > found.shape[0]:  # one voxel has 26 neighbours
                 found = grown(found)
             for step in steps:
                 if flat[found[n] + step] == 0:
