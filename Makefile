@@ -1,6 +1,6 @@
 # make validate   set up, build a study of real files, run the whole pipeline on it, say where the report lies
 # make test       set up, then lint, types, import rules and tests
-.PHONY: setup validate planted calibrated test pytest browser lint package docs pages study bars budget baseline anatomies bench stress peers aneurism liver conebeam seeing truth interrupt scale coverage mutants numbers shuffled cluster clean formats fuzz audit
+.PHONY: setup validate planted calibrated test pytest browser lint package docs pages study bars budget baseline anatomies bench stress peers aneurism liver conebeam seeing truth interrupt scale coverage mutants numbers bounds shuffled cluster clean formats fuzz audit
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
@@ -194,6 +194,12 @@ coverage: setup
 mutants: setup
 	$(COVERAGE)
 	$(BIN)/python -m tests.studies.mutants --seed $(SEED) --site $(OUT)/coverage -- -n 2 --dist loadfile
+
+# scans that nobody would scan, every index of compiled code checked: by itself it reads on beyond an array
+bounds: setup
+	NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=$(OUT)/bounds $(BIN)/python -W error -m tests.studies.odd_scans
+	NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=$(OUT)/bounds $(BIN)/python -m pytest -q -p no:cacheprovider tests/solver \
+	  tests/pipeline -k "solver or segment or trace or seeing or register or imaging or labelled or ends or wall"
 
 # all tests in three random orders
 shuffled: setup

@@ -17,9 +17,11 @@ from pipeline.trace.doubts import FAINT_BEYOND
 from pipeline.trace.elsewhere import brightest_line
 from pipeline.trace.explain import explained, hardly_begun, missed_mm
 from pipeline.trace.onward import GOES_ON
+from pipeline.trace.region import shows_lumen
 from pipeline.trace.rotation_plane import near_rotation_plane
 from pipeline.trace.stated import Opacity
 from pipeline.trace.subtraction import subtracting
+from pipeline.trace.verdict import note_of
 from pipeline.trace.whose_end import BEYOND_GAP, DIM_FROM_TIP, GAP, cleared
 
 __all__ = [
@@ -40,6 +42,12 @@ THICK_VOXELS = 1.6
 in a tenth of the scans that showed nothing else."""
 UNIT_ROOM = 0.095
 """How near log(length / depth) must be to the logarithm of a unit's factor for that unit to be named: a tenth."""
+
+OFF_THE_LUMEN = note_of(
+    "a frame of which no voxel lies in the lumen",
+    "scan and lumen in one place, in mm LPS",
+    "check the frame's origin and direction, and those of the reference or the lumen",
+)
 
 BACK_END = explained
 """How the curve is found: (subtraction, entry, previous, config) -> Curve."""
@@ -71,7 +79,7 @@ def trace(
     stated = EntryPose(np.asarray(entry_mm, float), heading, expected_mm, Opacity.of(opacity))
     curve = _seen((frame, reference, lumen), stated, previous, config)
     voxel = float(np.min(frame.spacing_mm))
-    larger, ok = times(voxel), curve.status is FrameStatus.OK
+    larger, ok = times(frame), curve.status is FrameStatus.OK
     if larger > 1 and (not ok or curve.levels.get("blur_mm", 0.0) > THICK_VOXELS * voxel):
         scans = coarse_scan(frame, larger), reference and coarse_scan(reference, larger), coarse_lumen(lumen, larger)
         again = _seen(scans, stated, previous, config)
@@ -92,6 +100,8 @@ def _seen(
 ) -> Curve:
     """The wire of a frame, by its reference and lumen. stated : in LPS."""
     frame, reference, lumen = scans
+    if not shows_lumen(frame, lumen):
+        return Curve(np.zeros((0, 3)), np.zeros(0), status=FrameStatus.NO_WIRE, note=OFF_THE_LUMEN)
     with subtracting(frame, lumen, reference) as image:
         entry = replace(stated, point=image.local(stated.point[None])[0], direction=image.turned(stated.direction))
         curve = BACK_END(image, entry, previous, config)

@@ -10,15 +10,18 @@ from solver.grid import Grid, read_only
 
 COARSE_MM = 0.3
 """Largest voxel that is made: guide wires are 0.3 to 1 mm thick."""
+LEAST_VOXELS = 8
+"""Fewest such voxels along an axis of the scan: a slab of fewer shows no line along it."""
 
 _of_lumen: WeakKeyDictionary[Lumen, tuple[int, Lumen]] = WeakKeyDictionary()
 _of_scan: WeakKeyDictionary[Volume, tuple[int, Volume]] = WeakKeyDictionary()
 """The last coarse version of each lumen and scan, with its factor: frames share them."""
 
 
-def times(voxel_mm: float) -> int:
-    """How many voxels of this size, along each axis, are averaged into one; 1 where they are large enough."""
-    return max(1, int(COARSE_MM / voxel_mm + 1e-6))
+def times(scan: Volume) -> int:
+    """How many of a scan's voxels, along each axis, are averaged into one; 1 where they are large enough, or few."""
+    voxel = float(np.min(scan.spacing_mm))
+    return max(1, min(int(COARSE_MM / voxel + 1e-6), min(scan.shape) // LEAST_VOXELS))
 
 
 def _means(grid: Grid, n: int) -> Grid:

@@ -107,7 +107,7 @@ def _ray(image: Subtraction, start: Array, heading: Array, least: float) -> Arra
     directions = cone(heading, float(np.arccos(CONE)), RAY_STEP)
     grey = image.along((start + s[:, None, None] * directions).reshape(-1, 3)).reshape(len(s), -1)
     noise = image.noise_in(CREST_VOXELS)
-    for stop in (len(s) // 2, len(s)):
+    for stop in filter(None, (len(s) // 2, len(s))):  # of voxels of 1 mm and more there is no half
         mean, outer = np.mean(grey[:stop], axis=0), np.mean(grey[stop // 2 : stop], axis=0)
         # a way that only noise suggests begins on the wire's last voxels, and has nothing further out
         ends = outer * np.sqrt((stop - stop // 2) / INDEPENDENT_VOXELS) > OUTER_SURE * noise

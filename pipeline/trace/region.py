@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtr
 
 from pipeline.arrays.edges import layer_in
-from pipeline.arrays.grids import contiguous, corners_mm, integer_offset, reorder, sampled, spread
+from pipeline.arrays.grids import contiguous, corners_mm, in_memory_order, integer_offset, reorder, sampled, spread
 from pipeline.arrays.lattice import sparse_zeros
 from pipeline.arrays.spare import Spare
 from pipeline.model import Lumen, Volume
@@ -90,6 +90,11 @@ class SearchRegion:
         return self.runs[:: max(1, len(self.runs) // 2000)]
 
     @cached_property
+    def holds_lumen(self) -> bool:
+        """Whether a voxel of the frames lies in the lumen."""
+        return bool(np.any(self.box.values < 0.0))
+
+    @cached_property
     def inner(self) -> NDArray[np.int64]:
         """Flat indices of all voxels that are more than a voxel inside the wall."""
         return np.flatnonzero(self.box.values < -float(np.min(self.box.spacing_mm)))
@@ -157,6 +162,12 @@ def region_of(frame: Grid, lumen: Lumen, axes: tuple[int, int, int]) -> SearchRe
     return known[1]
 
 
+def shows_lumen(frame: Volume, lumen: Lumen) -> bool:
+    """Whether a voxel of the frame lies in the lumen."""
+    grid, axes = in_memory_order(frame)
+    return region_of(grid, lumen, axes).holds_lumen
+
+
 def wall_blur(lumen: Lumen, voxel: float) -> float:
     """The scanner's blur (mm) as segment found it, else 0.9 voxel."""
     found = float(lumen.levels.get("scanner_blur_mm", float("nan")))
@@ -175,7 +186,7 @@ def _wall_model(
     at = region.sample
     grey, distance = scan.values[tuple((at + corner).T)], region.box.values[tuple(at.T)]
     deep, out = distance < -voxel, (distance > 2 * voxel) & (distance < HALO_VOXELS * voxel)
-    inside = float(np.median(grey[deep if deep.any() else distance < 0]))
+    inside = float(np.median(grey[deep if deep.any() else distance <= max(distance.min(), np.float32(-1e-9))]))
     outside = float(np.median(grey[out])) if out.any() else inside
     steps = np.arange(-TABLE_HALF, TABLE_HALF + 1) * TABLE_STEP * voxel
     # `segment` has looked; of a lumen that the user brings nobody knows, and a wire may pass for the vessel's core

@@ -22,7 +22,8 @@ BESIDE_VOXELS = 2.2
 
 def of_one_strand(share: Array, seen: NDArray[np.bool_]) -> float:
     """Height of one strand over that of most of the line: below 1 where two strands lie together nearly all along."""
-    return min(1.0, float(np.quantile(share[seen], ALONE))) if seen.any() else 1.0
+    height = float(np.quantile(share[seen], ALONE)) if seen.any() else 1.0
+    return min(1.0, height) if height > 0.0 else 1.0
 
 
 def doubled(share: Array, oblong: Array, bright: Array, noise: float) -> NDArray[np.bool_]:

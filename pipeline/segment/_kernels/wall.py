@@ -205,10 +205,16 @@ def surface_voxels(
 
 
 @kernel
+def _held(x: float, n: int) -> bool:
+    """Whether the four nodes of an index coordinate lie among n; NaN has none."""
+    return 1.0 <= x < n - 2.0
+
+
+@kernel
 def _closest(
     lattice: NDArray[Any], level: float, spacing: NDArray[Any], q: tuple[float, float, float]
 ) -> tuple[bool, float, float, float]:
-    """Whether Newton steps stay within two voxels of ``q``, and where on the surface they end."""
+    """Whether Newton steps stay in the box and within two voxels of ``q``, and where on the surface they end."""
     hx, hy, hz = spacing[0], spacing[1], spacing[2]
     reach = 2.0 * max(hx, hy, hz)
     px, py, pz = q
@@ -222,6 +228,10 @@ def _closest(
         along = (ax * gx + ay * gy + az * gz + f - level) / gg
         px, py, pz = px + ax - along * gx, py + ay - along * gy, pz + az - along * gz
         if max(abs(px - q[0]), abs(py - q[1]), abs(pz - q[2])) > reach:
+            return False, px, py, pz
+        # two voxels as long as slices are thick may be ten across: further than the padding
+        ni, nj, nk = lattice.shape
+        if not (_held(px / hx, ni) and _held(py / hy, nj) and _held(pz / hz, nk)):
             return False, px, py, pz
     return True, px, py, pz
 
