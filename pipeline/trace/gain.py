@@ -2,7 +2,7 @@
 never twice the same, and grey is counted from elsewhere where a scanner is not calibrated.
 
 A wire, blurred, reaches every voxel of a narrow vessel and makes it brighter, never darker: the medium is read off the
-darkest tenth of the lumen.
+darkest tenth of the lumen, or off the darkest tenth of its pieces where that is less.
 """
 
 from typing import Any
@@ -20,6 +20,10 @@ LEAST_LEVEL = 200
 DARKEST = 0.1
 """Share of the lumen's voxels that shows the medium alone: a wire that reaches all but three tenths of them moves this
 quantile by a third of the noise of a voxel, and a median by any amount."""
+BLOCK, LEAST_IN_BLOCK, LEAST_BLOCKS = 8, 8, 10
+"""Edge of a piece of lumen in voxels, fewest voxels of one that counts, and fewest pieces. Where a wire lies in nearly
+all of a vessel of 0.6 to 0.7 mm radius, the darkest tenth of voxels has 2 to 5 % more contrast at a contrast of 30
+noises, that of pieces 1 to 3 %: a faint end of three noises was taken off with that."""
 SAME_GAIN = 0.02
 """Difference of two scans' contrast, as a share of it, that is left alone."""
 SAME_OFFSET, SURE_OFFSET = 0.2, 5.0
@@ -35,19 +39,40 @@ DARKEST_OF_ALL = 0.02
 """Share of the lumen's voxels from which on to DARKEST noise is read then: no wire is in them."""
 
 
-def _difference(rest: Array, full: Array, deep: NDArray[np.bool_], out: NDArray[np.bool_], noise: float) -> float:
+def _of_pieces(rest: Array, full: Array, piece: NDArray[np.int64]) -> tuple[Array, Array]:
+    """What is left over the contrast in each piece, and its standard deviation where that of a voxel's rest is 1.
+
+    rest, full : (n,) of voxels.  piece : (n,) the number of the piece that each of them lies in.
+    """
+    size = np.bincount(piece)
+    whole = np.bincount(piece, full)
+    kept = size >= LEAST_IN_BLOCK
+    return np.bincount(piece, rest)[kept] / whole[kept], np.sqrt(size[kept]) / whole[kept]
+
+
+def _difference(
+    rest: Array, full: Array, piece: NDArray[np.int64], where: tuple[NDArray[np.bool_], NDArray[np.bool_]], noise: float
+) -> float:
     """By how much the contrast differs, as a share of it; 0 for the same.
 
     rest : (n,) frame minus reference, both as they were scanned: smoothing lowers the middle of a narrow vessel.
-    full : (n,) the background above what surrounds the vessel; less near the wall.  deep, out : which of the n voxels
-    lie well inside the lumen, and outside it.  noise : spread of ``rest`` there.
+    full : (n,) the background above what surrounds the vessel; less near the wall.  piece : (n,) the number of the
+    piece of the scan that each of the n voxels lies in.  where : which of them lie well inside the lumen, and which
+    outside it.  noise : spread of ``rest`` there.
     """
+    deep, out = where
     contrast = float(np.median(full[deep]))
     inner = deep & (full > 0.5 * contrast)
     if contrast < noise or np.count_nonzero(inner) < LEAST_LEVEL:
         return 0.0
-    more = (rest[inner] - np.median(rest[out])) / full[inner]
-    medium = float(np.quantile(more, DARKEST) - ndtri(DARKEST) * noise / contrast)
+    rest = rest - np.median(rest[out])
+    medium = float(np.quantile(rest[inner] / full[inner], DARKEST) - ndtri(DARKEST) * noise / contrast)
+    pieces, deviations = _of_pieces(rest[inner], full[inner], piece[inner])
+    if len(pieces) >= LEAST_BLOCKS:
+        # correlated noise does not average out: the pieces outside the lumen tell
+        beside, white = _of_pieces(rest[out], np.ones(np.count_nonzero(out)), piece[out])
+        own = spread(beside / white) if len(beside) else noise
+        medium = min(medium, float(np.quantile(pieces - ndtri(DARKEST) * own * deviations, DARKEST)))
     return medium if abs(medium) > max(SAME_GAIN, SAME_NOISE * noise / contrast) else 0.0
 
 
@@ -70,7 +95,9 @@ def matched(
     if np.mean(seen[out] == seen.min()) > CUT_OFF:
         # cut off, noise is half as large there, and its median is not its mean, which the smoothed reference shows
         noise, offset = _darker(rest[deep]), float(np.median(rest[out]))
-    more = _difference(rest, medium - low, deep, out, noise)
+    coarse = tuple(n // BLOCK + 1 for n in region.box.shape)
+    piece = np.ravel_multi_index(tuple((region.sample // BLOCK).T), coarse)
+    more = _difference(rest, medium - low, piece, (deep, out), noise)
     sure = max(SAME_OFFSET, SURE_OFFSET / float(np.sqrt(np.count_nonzero(out))))
     apart = abs(offset) > sure * noise
     if more != 0.0 or apart:
