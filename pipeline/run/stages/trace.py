@@ -18,7 +18,7 @@ from pipeline.run.helpers import Earlier
 from pipeline.run.log import Log
 from pipeline.run.projections import grey_window, projections
 from pipeline.run.stages.before import NOTHING, Before
-from pipeline.run.stages.beside import beside_what_is_seen, elsewhere
+from pipeline.run.stages.beside import beside_what_is_seen
 from pipeline.run.stages.brightness import of_another_brightness
 from pipeline.run.stages.depths import (
     drawn_back,
@@ -77,15 +77,15 @@ def trace_frames(run: Context, known: Known) -> Known:
     run.log.warnings += [*too_thin(frames, known.vessel, radius_mm), *of_another_brightness(frames, radius_mm)]
     if not given:
         run.log.warnings += cut_off(trusted(frames))
-    seen = [part.seen for part in parts]
-    run.log.warnings += beside_what_is_seen(frames, seen, run.config.trace, voxel_mm)
+    off_scans, elsewhere = beside_what_is_seen(frames, [part.seen for part in parts], run.config.trace, voxel_mm)
+    run.log.warnings += off_scans
     run.log.warnings += work.wire_in_reference
     run.log.warnings += _in_plane(frames, run.config.trace)
     assumed, doubtful = sentences_of(work.alignment, {frame.index: frame.registration for frame in frames})
     run.log.assumptions += assumed
     run.log.warnings += doubtful + of_drift({f.index: f.curve for f in frames if f.curve is not None})
     frames = [_first_said(frame, known.lumen_doubt) for frame in frames]
-    return _with_room(run, known, frames, elsewhere(frames, seen, run.config.trace, voxel_mm))
+    return _with_room(run, known, frames, elsewhere)
 
 
 def _in_step(run: Context, frames: list[Frame], voxel_mm: float) -> list[Frame]:
