@@ -10,6 +10,8 @@ from solver.grid import Array, Grid, read_only
 
 MAD = 1.4826
 """Standard deviation of normal noise over its median absolute deviation."""
+LATTICE_MM, LATTICE_VOXELS = 0.3, 60e6
+"""Voxels of a lumen that comes without a lattice; they are larger where its box would hold more than so many."""
 
 
 def reorder(grid: Grid, axes: tuple[int, int, int]) -> Grid:
@@ -51,6 +53,11 @@ def around(grid: Grid, points_mm: Array, room_mm: float) -> Grid:
     low = np.clip(np.floor(index.min(axis=0)), 0, np.array(grid.shape) - 1).astype(int)
     high = np.clip(np.ceil(index.max(axis=0)) + 1, low + 1, grid.shape).astype(int)
     return grid.crop((low[0], low[1], low[2]), (high[0], high[1], high[2]))
+
+
+def lattice_mm(size_mm: Array) -> float:
+    """Edge (mm) of the voxels of a box of this size (3,), mm, that comes without a lattice."""
+    return max(LATTICE_MM, float(np.cbrt(np.prod(size_mm) / LATTICE_VOXELS)))
 
 
 def integer_offset(grid: Grid, inner: Grid) -> NDArray[np.int64] | None:
