@@ -97,6 +97,15 @@ def slopes_at(grid: Grid, index: NDArray[np.int64]) -> Array:
     return np.stack(slope, axis=1).astype(float)
 
 
+def normals_at(grid: Grid, near: NDArray[np.bool_], count: int) -> tuple[NDArray[np.int64], Array]:
+    """Indices (n, 3) of about ``count`` voxels of those that are set, off the grid's edge; unit normals (n, 3), LPS."""
+    flat = np.flatnonzero(near)
+    index = unflattened(flat[:: max(1, len(flat) // count)], grid.shape)
+    index = index[np.all((index > 0) & (index < np.array(grid.shape) - 1), axis=1)]
+    normals = slopes_at(grid, index) @ grid.direction.T
+    return index, np.asarray(normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9))
+
+
 def indices_of(mask: NDArray[np.bool_]) -> NDArray[np.int64]:
     """Indices (n, 3) where a contiguous mask is set, as ``np.argwhere``, in a fifth of its time where little is set."""
     return unflattened(np.flatnonzero(mask), mask.shape)
