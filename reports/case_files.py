@@ -201,6 +201,17 @@ def counted(count: int, noun: str) -> str:
     return f"{count} {noun}{'s' * (count != 1)}"
 
 
+def counted_scans(good: int, planned: int, fitted: int, word: str) -> str:
+    """``6 scans: 1 used for the roll, 5 scored``, and where not all are good ``4 scored, 1 without a result``.
+
+    A scan that the roll was fitted on is no frame that is scored.
+
+    good, planned : of the frames beside the ``fitted`` ones.     word : what a good one is called.
+    """
+    lost = f", {planned - good} without a result" * (good < planned)
+    return f"{counted(planned + fitted, 'scan')}: {fitted} used for the roll, {good} {word}{lost}"
+
+
 def not_reached(out_dir: Path) -> str:
     """Why nothing is scored, where every run into a folder was to end before frames are compared; else empty."""
     ends = [str(run.get("until", "")) for run in runs_in(out_dir)]

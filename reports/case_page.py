@@ -7,8 +7,7 @@ from typing import Any
 from reports import _content
 from reports._content import flatten, settings
 from reports.alike import alike
-from reports.case_files import GOOD, CaseFiles, counted, read_case, runs_in
-from reports.counts import scans
+from reports.case_files import GOOD, CaseFiles, counted, counted_scans, read_case, runs_in
 from reports.doubts import Doubt, copied_from_traces, weightiest_first
 from reports.figures import declared
 from reports.listing import listed_files, listed_view
@@ -106,7 +105,7 @@ def _case_verdict(case: CaseFiles, doubt: Doubt) -> str:
     good, planned = case.statistics.get("frames_ok"), case.statistics.get("frames")
     became = said[:1].upper() + said[1:] + "."
     if fitted := case.statistics.get("frames_fitted"):
-        became = scans(good or 0, planned or 0, fitted, scored_or_ok([case])) + "."
+        became = counted_scans(good or 0, planned or 0, fitted, scored_or_ok([case])) + "."
     elif planned and good != planned:
         became = "" if how.startswith("On ") else f"{good} of {counted(planned, 'frame')} have a result."
     judged = bool(how) and not doubt.copied and _content.number(scored.get("skill_strongest")) != _content.NOTHING

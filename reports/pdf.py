@@ -11,8 +11,16 @@ from matplotlib.backends.backend_pdf import PdfPages
 from reports import _content, colours
 from reports.alike import alike, of_what
 from reports.atomic import replacing
-from reports.case_files import WORST, CaseFiles, counted, not_reached, not_run_sentence, read_case, results_in
-from reports.counts import scans
+from reports.case_files import (
+    WORST,
+    CaseFiles,
+    counted,
+    counted_scans,
+    not_reached,
+    not_run_sentence,
+    read_case,
+    results_in,
+)
 from reports.doubts import assumed, doubt_of, said_by_cases
 from reports.figures import declared, figures_of
 from reports.gates import gates_in
@@ -71,7 +79,7 @@ def _first(out_dir: Path, summary: pd.DataFrame, whole: pd.DataFrame) -> Page:
     said = verdict(row, simulator, doubt) or why_not_pooled(out_dir) or unscored(cases) or not_reached(out_dir)
     frames = f"{ok} of {counted(planned, 'frame')} have a result"
     if fitted := int(summary["frames_fitted"].sum()):
-        frames = scans(ok, planned, fitted, "with a result")
+        frames = counted_scans(ok, planned, fitted, "with a result")
     page.text(f"{counted(len(summary), 'case')}, {frames}. {said}", size=11)
     for line in gates_in(out_dir)["closed"]:
         page.text(f"{line[0].upper()}{line[1:]}.", size=11, colour=colours.BAD)

@@ -15,6 +15,7 @@ from reports.case_files import (
     CaseFiles,
     amiss,
     counted,
+    counted_scans,
     find_cases,
     left_out_sentence,
     left_over_sentence,
@@ -24,7 +25,6 @@ from reports.case_files import (
     read_case,
 )
 from reports.case_page import case_failures, scored_or_ok, version_of
-from reports.counts import scans
 from reports.doubts import assumed, doubt_of
 from reports.figures import RunFiles, declared
 from reports.gates import gates_in
@@ -187,7 +187,7 @@ def _headline(cases: list[CaseFiles], missing: Sequence[str], damaged: Container
     frames = f"{counted(n_frames, 'frame')}: {n_good} ok"
     frames += f", {n_frames - n_good} without a result" * (n_good < n_frames)
     if fitted := sum(case.statistics.get("frames_fitted") or 0 for case in cases):
-        frames = scans(n_good, n_frames, fitted, scored_or_ok(cases))
+        frames = counted_scans(n_good, n_frames, fitted, scored_or_ok(cases))
     sentence = f"{of}{counted(len(cases) + len(absent), 'case')}, {frames}."
     name = _simulator(cases)
     title = " - ".join(filter(None, (name, "wireval")))

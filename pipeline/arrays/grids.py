@@ -10,6 +10,8 @@ from solver.grid import Array, Grid, read_only
 
 MAD = 1.4826
 """Standard deviation of normal noise over its median absolute deviation."""
+LATTICE_MM, LATTICE_VOXELS = 0.3, 60e6
+"""Voxels of a lumen that comes without a lattice; they are larger where its box would hold more than so many."""
 
 
 def reorder(grid: Grid, axes: tuple[int, int, int]) -> Grid:
@@ -53,6 +55,11 @@ def around(grid: Grid, points_mm: Array, room_mm: float) -> Grid:
     return grid.crop((low[0], low[1], low[2]), (high[0], high[1], high[2]))
 
 
+def lattice_mm(size_mm: Array) -> float:
+    """Edge (mm) of the voxels of a box of this size (3,), mm, that comes without a lattice."""
+    return max(LATTICE_MM, float(np.cbrt(np.prod(size_mm) / LATTICE_VOXELS)))
+
+
 def integer_offset(grid: Grid, inner: Grid) -> NDArray[np.int64] | None:
     """Index (3,) in ``grid`` of voxel (0, 0, 0) of ``inner`` if both lie on one lattice, else None.
 
@@ -88,6 +95,15 @@ def slopes_at(grid: Grid, index: NDArray[np.int64]) -> Array:
     steps = enumerate(np.eye(3, dtype=int))
     slope = [(values[tuple((index + s).T)] - values[tuple((index - s).T)]) / grid.spacing_mm[a] for a, s in steps]
     return np.stack(slope, axis=1).astype(float)
+
+
+def normals_at(grid: Grid, near: NDArray[np.bool_], count: int) -> tuple[NDArray[np.int64], Array]:
+    """Indices (n, 3) of about ``count`` voxels of those that are set, off the grid's edge; unit normals (n, 3), LPS."""
+    flat = np.flatnonzero(near)
+    index = unflattened(flat[:: max(1, len(flat) // count)], grid.shape)
+    index = index[np.all((index > 0) & (index < np.array(grid.shape) - 1), axis=1)]
+    normals = slopes_at(grid, index) @ grid.direction.T
+    return index, np.asarray(normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9))
 
 
 def indices_of(mask: NDArray[np.bool_]) -> NDArray[np.int64]:

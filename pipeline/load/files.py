@@ -63,10 +63,7 @@ def read_header(source: Source, config: LoadConfig) -> Header:
     if head.channels != 1:
         why = f"{head.channels} values per voxel; allowed: a 3-D grey-value volume, or a 4-D file that is a sequence"
         raise unusable(source.path, f"got {why} of them (its last axis counts them).")
-    return Header(
-        source, head.shape, head.spacing_mm, head.origin_mm, head.direction, str(head.kind.newbyteorder("=")),
-        item_count=head.items, assumed=head.assumed,
-    )  # fmt: skip
+    return head.header(source)
 
 
 def read(header: Header, box: Box, config: LoadConfig) -> NDArray[Any]:

@@ -99,7 +99,7 @@ class Header:
 ORTHONORMAL = 1e-3
 """Largest departure of a direction matrix from orthonormal: header rounding is below it, a shear far above."""
 SPACING_MM, FARTHEST_MM = (1e-3, 100.0), 1e4
-"""A voxel's edges, and the farthest that a scan may reach from the origin: beyond these a unit is not mm."""
+"""A voxel's edges, and the farthest that anything may reach from the origin: beyond these a unit is not mm."""
 
 
 def judged(header: Header) -> Header:

@@ -18,7 +18,7 @@ from typing import IO, BinaryIO, ParamSpec, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pipeline.load.geometry import LoadError, unusable
+from pipeline.load.geometry import FARTHEST_MM, LoadError, unusable
 from reports import texts
 
 GIB = 2**30
@@ -130,18 +130,14 @@ def require_room(what: object, need: int, there: int, packing: str, most_gib: fl
         raise unusable(what, f"{why}. If this is meant, store it unpacked.")
 
 
-LARGEST_MM = 1e4
-"""Whatever a user brings lies within 10 m of the origin: beyond, a unit is wrong."""
-
-
 def reachable(what: object, points: ArrayLike, name: str = "points") -> NDArray[np.float64]:
     """Coordinates (any shape) in mm; LoadError where they are not finite, or beyond anything that lies in a scanner."""
     values = np.asarray(points, float)
     if not np.all(np.isfinite(values)):
         raise unusable(what, f"{name} that are NaN or infinite; expected finite numbers in mm; correct the file")
     far = float(np.abs(values).max(initial=0.0))
-    if far > LARGEST_MM:
-        why = f"{name} up to {far:.3g} mm from the origin; expected {LARGEST_MM:g} mm at most"
+    if far > FARTHEST_MM:
+        why = f"{name} up to {far:.3g} mm from the origin; expected {FARTHEST_MM:g} mm at most"
         raise unusable(what, f"{why}; are they in another unit than mm?")
     return values
 

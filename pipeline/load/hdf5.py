@@ -5,6 +5,7 @@ A dataset's attributes give spacing_mm (needed), origin_mm (default 0), directio
 The datasets of a group come in natural order, and each one's geometry is compared with that of the first.
 """
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -111,11 +112,8 @@ def read_header(source: Source, config: LoadConfig) -> Header:
             if len(headers) > 1:
                 require_same_geometry(judged(headers[0]), judged(header), str(data.name))
         count = volumes[0].shape[0] if volumes[0].ndim == 4 else len(volumes)
-    first = headers[0]
-    return Header(
-        source, first.shape, first.spacing_mm, first.origin_mm, first.direction, first.pixel_type, int(count),
-        tuple(dict.fromkeys(note for header in headers for note in header.assumed)),
-    )  # fmt: skip
+    notes = dict.fromkeys(note for header in headers for note in header.assumed)
+    return replace(headers[0], item_count=int(count), assumed=tuple(notes))
 
 
 def _header(source: Source, data: h5py.Dataset, config: LoadConfig) -> Header:

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
+from pipeline.arrays.grids import LATTICE_VOXELS, lattice_mm
 from pipeline.load.curves import markups_in, of_json, positions_of
 from pipeline.load.geometry import Mask, Source, refused
 from pipeline.load.guard import reachable, read_text, told
@@ -80,8 +81,8 @@ def _centreline(shapes: Shapes, path: Path) -> Branches:
 
 SHORTEST_MM = 2.0
 """No vessel that a wire is pushed through is shorter: a file of this size is in metres."""
-COARSEST_MM, LATTICE_VOXELS, MOST_FEET, MOST_WORK = 1.5, 60e6, 2e7, 5e9
-"""Coarsest voxel of the lattice that a lumen is put on; most voxels, points on the wall and visits to voxels."""
+COARSEST_MM, MOST_FEET, MOST_WORK = 1.5, 2e7, 5e9
+"""Coarsest voxel of the lattice that a lumen is put on; most points on the wall and visits to voxels."""
 
 
 def _in_bounds(path: Path, found: Branches | Shapes) -> Branches | Shapes:
@@ -91,7 +92,7 @@ def _in_bounds(path: Path, found: Branches | Shapes) -> Branches | Shapes:
         got = f"a lumen of {np.ptp(ends, axis=0).max():.3g} mm"
         raise refused(path, got, f"{SHORTEST_MM:g} mm or more", "is it in metres? Convert it to mm")
     size = np.ptp(ends, axis=0) + 10.0
-    voxel = max(0.3, float(np.cbrt(np.prod(size) / LATTICE_VOXELS)))
+    voxel = lattice_mm(size)
     if voxel > COARSEST_MM:
         got = f"a lumen of {' x '.join(f'{n:.0f}' for n in size)} mm"
         allowed = f"a box that fits into {LATTICE_VOXELS:.0f} voxels of {COARSEST_MM:g} mm"

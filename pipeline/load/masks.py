@@ -14,7 +14,7 @@ from pipeline.load.config import LoadConfig
 from pipeline.load.files import head_of
 from pipeline.load.geometry import Header, Mask, Source, judged, refused
 from pipeline.load.guard import told
-from pipeline.load.voxels import Head, Names, plain, read_box
+from pipeline.load.voxels import Names, plain, read_box
 from pipeline.model import Volume
 from pipeline.status import did_you_mean
 from solver.grid import read_only
@@ -50,7 +50,7 @@ def mask_header(source: Source) -> Header:
     else:
         with told(path):
             head = head_of(path)
-            header, names = judged(_header(source, head)), head.names
+            header, names = judged(head.header(source)), head.names
     _require_label(source, names, np.dtype(header.pixel_type))
     return header
 
@@ -74,11 +74,6 @@ def _require_label(source: Source, names: Names, kind: np.dtype[Any]) -> None:
         if not least <= label <= most:
             allowed = f"{least} to {most}, which voxels of type {kind} can be"
             raise refused(source.path, f"label {label}", allowed, "name a label of the file")
-
-
-def _header(source: Source, head: Head) -> Header:
-    geometry = head.spacing_mm, head.origin_mm, head.direction
-    return Header(source, head.shape, *geometry, str(head.kind), head.items, head.assumed)
 
 
 def _voxels(source: Source, label: int | str | None) -> tuple[Volume, Names]:

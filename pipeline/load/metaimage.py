@@ -6,7 +6,7 @@ import numpy as np
 
 from pipeline.load.geometry import unusable
 from pipeline.load.guard import opened, size_of
-from pipeline.load.outside import beside, millimetres, numbered, numbers, said_twice
+from pipeline.load.outside import millimetres, named_files, numbers, said_twice
 from pipeline.load.voxels import Head, Placed, axes_of
 
 LONGEST_HEADER = 65536
@@ -113,15 +113,8 @@ def _begin(name: Path, header: Path, tags: dict[str, str], end: int, voxel_bytes
 
 
 def _files(path: Path, text: str, below: str, planes: int) -> list[Path]:
-    """The data files: the header's own, one, a list below it, or a pattern with its first and last number."""
-    words = text.split()
-    if text.upper() == "LOCAL":
-        return [path]
-    if words and words[0].upper() == "LIST":
-        return [beside(path, line.strip()) for line in below.splitlines() if line.strip()]
-    if "%" in text:
-        return numbered(path, words, planes)
-    return [beside(path, text)]
+    """The data files: the header's own, or others."""
+    return [path] if text.upper() == "LOCAL" else named_files(path, text, below, planes)
 
 
 def _geometry(path: Path, tags: dict[str, str], count: int) -> tuple[Placed, tuple[str, ...]]:

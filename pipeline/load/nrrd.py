@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from pipeline.load.geometry import unusable
 from pipeline.load.guard import opened, size_of
-from pipeline.load.outside import beside, millimetres, numbered, numbers, said_twice
+from pipeline.load.outside import millimetres, named_files, numbers, said_twice
 from pipeline.load.voxels import Head, Names, Placed, axes_of
 
 LONGEST_HEADER = 4 * 2**20
@@ -110,7 +110,7 @@ def _fields(path: Path) -> tuple[dict[str, str], int]:
             value = value.removeprefix("=").strip()
             if fields.setdefault(key, value) != value:
                 raise said_twice(path, f"{key}: {fields[key][:40]}", f"{key}: {value[:40]}")
-    if fields.get("data file", "").upper().startswith("LIST"):
+    if fields.get("data file", "").upper().split()[:1] == ["LIST"]:
         fields["data file"] += "\n" + text.partition(fields["data file"])[2]
     return fields, end
 
@@ -138,13 +138,9 @@ MOST_LINES = 1000
 
 
 def _files(path: Path, fields: dict[str, str], planes: int) -> list[Path]:
-    """The data files: the header's own, one, a list below it, or a pattern with its first and last number."""
-    text = fields.get("data file", "")
-    if not text:
-        return [path]
-    if text.upper().startswith("LIST"):
-        return [beside(path, line.strip()) for line in text.splitlines()[1:] if line.strip()]
-    return numbered(path, text.split(), planes) if "%" in text else [beside(path, text)]
+    """The data files: the header's own, or others."""
+    text, _, below = fields.get("data file", "").partition("\n")
+    return named_files(path, text, below, planes) if text else [path]
 
 
 def _vectors(path: Path, fields: dict[str, str], count: int) -> list[NDArray[Any] | None]:

@@ -96,6 +96,14 @@ def beside(header: Path, name: str) -> Path:
     return header.parent / part
 
 
+def named_files(header: Path, text: str, below: str, planes: int) -> list[Path]:
+    """The files that a header names: one, those of the list below it, or a pattern with its first and last number."""
+    words = text.split()
+    if words and words[0].upper() == "LIST":
+        return [beside(header, line.strip()) for line in below.splitlines() if line.strip()]
+    return numbered(header, words, planes) if "%" in text else [beside(header, text)]
+
+
 def numbered(header: Path, words: list[str], count: int) -> list[Path]:
     """The files of a pattern as ``slice_%03d.raw 1 64 1``: their first number, last number and step."""
     name = words[0] if words else ""

@@ -54,7 +54,6 @@ class Plane:
 
     path: Path
     frame: int
-    series: str
     position: NDArray[np.float64]
     orientation: NDArray[np.float64]
     pixel_mm: NDArray[np.float64]
@@ -129,10 +128,8 @@ def planes_of(path: Path, data: Any) -> list[Plane]:
 def _plane(path: Path, frame: int, groups: list[Any], pixels: Pixels, *, several: bool) -> Plane:
     position, orientation, spacing = (_numbers(path, groups, name, count) for name, count in PLACE)
     slope, intercept = (_numbers(path, groups, name, 1, default) for name, default in RESCALE)
-    series = str(groups[-1].get("SeriesInstanceUID", ""))
-    return Plane(
-        path, frame, series, position, orientation, spacing[::-1], pixels, float(slope[0]), float(intercept[0]), several
-    )
+    rescale = float(slope[0]), float(intercept[0])
+    return Plane(path, frame, position, orientation, spacing[::-1], pixels, *rescale, several)
 
 
 RESCALE = (("RescaleSlope", 1.0), ("RescaleIntercept", 0.0))

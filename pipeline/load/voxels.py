@@ -12,7 +12,7 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.load.geometry import Box, LoadError, unusable
+from pipeline.load.geometry import Box, Header, LoadError, Source, unusable
 from pipeline.load.guard import require_room, size_of, skip, unpacked
 from pipeline.load.outside import misfits, to_numbers
 
@@ -64,6 +64,11 @@ class Head:
     def planes(self) -> int:
         """Planes in all volumes."""
         return self.shape[2] * self.items
+
+    def header(self, source: Source) -> Header:
+        """The geometry and type alone, of the scan that a manifest names so."""
+        placed, kind = (self.spacing_mm, self.origin_mm, self.direction), str(self.kind.newbyteorder("="))
+        return Header(source, self.shape, *placed, kind, self.items, self.assumed)
 
 
 def axes_of(path: Path, sizes: list[int]) -> tuple[tuple[int, int, int], int]:

@@ -30,7 +30,7 @@ CLEARLY = 0.8
 """Least squares without SimpleITK is believed where its misfit is smaller by this factor."""
 STRUCTURE_POINTS = 12000
 """Points on walls and bones that a moved frame is fitted at."""
-LEAST_POINTS = 200
+WALL_POINTS = 200
 """Fewer points show no motion."""
 BAND_VOXELS = 2.0
 """How far from the wall the first look's points lie: a blurred wall is as wide."""
@@ -51,7 +51,7 @@ class Anchor:
     @cached_property
     def hides(self) -> bool:
         """Whether the wall may move in some way, as a straight tube along itself, without its scans showing it."""
-        return len(self.wall.points_mm) >= LEAST_POINTS and hidden(self.wall)
+        return len(self.wall.points_mm) >= WALL_POINTS and hidden(self.wall)
 
     @cached_property
     def edges(self) -> NDArray[np.bool_]:
@@ -161,7 +161,7 @@ def register(frame: Volume, to: Anchor, skip_voxels: float) -> Registration:
     which the walls still do not fit (not ``trusted``).
     """
     wall = to.wall
-    if len(wall.points_mm) < LEAST_POINTS:
+    if len(wall.points_mm) < WALL_POINTS:
         return Registration(misfit_voxels=float("inf"))
     first, _ = look(frame, wall, Motion(), skip_voxels)
     moved = farthest(first.motion, wall)

@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 
 from pipeline.arrays.grids import MAD
 from pipeline.model import Array
-from pipeline.register.patches import LEAST_POINTS, means, products, shaded, spread_out
+from pipeline.register.patches import PATCH_POINTS, means, products, shaded, spread_out
 from pipeline.register.shift import METAL_SCALES, METAL_VOXELS, TUKEY, Solved, StaticPoints, near_metal
 
 ROUNDS = 2
@@ -119,7 +119,7 @@ def _shifts(s: StaticPoints, gain: Array, grey: Array, used: NDArray[np.bool_]) 
         residual = grey - np.sum(design * spread_out(shift, s.starts, count), axis=1) - s.shade(shades)
         scale = MAD * float(np.median(np.abs(residual[used]))) + 1e-9
         weights = used * np.clip(1.0 - (residual / (TUKEY * scale)) ** 2, 0.0, None) ** 2
-    return shift, np.add.reduceat(weights, s.starts) > 0.5 * LEAST_POINTS
+    return shift, np.add.reduceat(weights, s.starts) > 0.5 * PATCH_POINTS
 
 
 def _shown(normal: Array, right: Array) -> Array:

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.model import Curve, Volume
-from pipeline.register import BAD_MISFIT_VOXELS, LEAST_POINTS, Anchor, Motion, register
+from pipeline.register import BAD_MISFIT_VOXELS, WALL_POINTS, Anchor, Motion, register
 from pipeline.register.shift import farthest, look
 from pipeline.status import FrameStatus
 
@@ -26,7 +26,7 @@ def with_drift(curve: Curve, frame: Volume, first: Anchor | None) -> Curve:
 
     frame : its scan.  first : of the first frame; None where there is a reference, or nothing is to be registered.
     """
-    if first is None or len(first.wall.points_mm) < LEAST_POINTS:
+    if first is None or len(first.wall.points_mm) < WALL_POINTS:
         return curve
     refused = curve.status is not FrameStatus.OK
     voxels = _since(frame, first, doubted=refused)

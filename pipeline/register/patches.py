@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from pipeline.model import Array
 
-LEAST_POINTS = 60
+PATCH_POINTS = 60
 """Points of a patch: five numbers are found from them."""
 LEAST_MM = 5.0
 SPAN_RADII = 4.0
@@ -22,7 +22,7 @@ def parted(points_mm: Array, span_mm: float) -> tuple[NDArray[np.intp], NDArray[
 
     A pair extends no farther than ``span_mm`` where it has points enough.
     """
-    if len(points_mm) < 2 * LEAST_POINTS:
+    if len(points_mm) < 2 * PATCH_POINTS:
         return np.arange(len(points_mm)), np.zeros(1, np.intp)
     pieces, todo = [], [np.arange(len(points_mm))]
     while todo:
@@ -30,7 +30,7 @@ def parted(points_mm: Array, span_mm: float) -> tuple[NDArray[np.intp], NDArray[
         extent = np.ptp(points_mm[piece], axis=0)
         along = points_mm[piece, int(np.argmax(extent))]
         piece, half = piece[np.argsort(along, kind="stable")], len(piece) // 2
-        if extent.max() > span_mm and len(piece) >= 4 * LEAST_POINTS:
+        if extent.max() > span_mm and len(piece) >= 4 * PATCH_POINTS:
             todo += [piece[half:], piece[:half]]
         else:
             pieces += [piece[:half], piece[half:]]

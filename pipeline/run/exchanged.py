@@ -17,6 +17,7 @@ from pipeline.model import Array, arc_length
 from pipeline.run.another import Others, of_one_phantom
 from pipeline.run.overall import Found
 from pipeline.run.traced import arrays_of, compare_of, traces_of
+from reports.case_files import thinned
 
 LOOKED_AT, FEWEST, NEARER, IN_ALL = 6, 3, 0.7, 0.5
 """Frames, spread over a case, that are looked at; how many of them, all but one, must be nearer to the other insertion;
@@ -44,9 +45,9 @@ def exchanged(out: Path, found: Sequence[Found]) -> list[str]:
         for case in cases:
             kin = [(c.insertion, traces[c.result.case]) for c in cases if c.insertion != case.insertion]
             own, simulated = traces[case.result.case], arrays_of(out, case, "simulated_mm")
-            seen = [
-                (*own[n], simulated[n]) for n in _spread(sorted(case.frames.keys() & own.keys() & simulated.keys()))
-            ]
+            numbers = sorted(case.frames.keys() & own.keys() & simulated.keys())
+            looked_at = [numbers[k] for k in thinned(len(numbers), LOOKED_AT)]
+            seen = [(*own[n], simulated[n]) for n in looked_at]
             fit = fit_of(seen, Others(kin, own), config)
             if fit is not None:
                 fits[case.result.case] = fit
@@ -58,11 +59,6 @@ def exchanged(out: Path, found: Sequence[Found]) -> list[str]:
             for case, fit in ring.items()
         ]
     return said
-
-
-def _spread(numbers: Sequence[int]) -> list[int]:
-    """A few numbers, from the first to the last."""
-    return [numbers[n] for n in np.unique(np.linspace(0, len(numbers) - 1, LOOKED_AT).astype(int))] if numbers else []
 
 
 def fit_of(seen: Sequence[tuple[float, Array, Array]], others: Others, config: CompareConfig) -> Fit | None:

@@ -1,6 +1,6 @@
 """Fuzzy connectedness of a grid: absolute at one threshold, all strengths, or relative to a rival object."""
 
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,12 +53,8 @@ def estimate_affinity(levels: GreyLevels, config: SegmentConfig = SegmentConfig(
     return Affinity((FULL * h).astype(np.float32), o.astype(np.float32), low, 1.0 / step, taps)
 
 
-def neighbours(adjacency: int) -> Index:
+def neighbours(adjacency: Literal[6, 26]) -> Index:
     """Offsets (n, 3) of the 6 face neighbours or of all 26."""
-    if adjacency not in (6, 26):
-        raise ValueError(
-            f"segment.adjacency: got {adjacency}; expected 6 or 26; 6 keeps vessels apart that touch at an edge"
-        )
     steps = np.stack(np.meshgrid(*[(-1, 0, 1)] * 3, indexing="ij"), -1).reshape(-1, 3)
     size = np.abs(steps).sum(axis=1)
     return np.asarray(steps[size == 1] if adjacency == 6 else steps[size > 0], np.int64)

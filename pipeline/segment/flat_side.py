@@ -5,8 +5,7 @@ It faces up, whatever the way of the vessel, and what lies beyond it has nothing
 
 import numpy as np
 
-from pipeline.arrays.grids import slopes_at, unflattened
-from pipeline.model import Array
+from pipeline.arrays.grids import normals_at
 from solver.grid import Grid
 
 NEAR_VOXELS, LOOKED_AT, TRIED = 0.6, 4000, 300
@@ -21,7 +20,8 @@ vessels filled half or three quarters it is 0.18 to 0.3 and 3 to 4 times."""
 
 def flat_side(distance: Grid) -> tuple[str, ...]:
     """One sentence for the report where a wall is flat on one side, or none. distance : signed, mm."""
-    normals = _normals(distance)
+    near = np.abs(distance.values) < NEAR_VOXELS * float(np.min(distance.spacing_mm))
+    _, normals = normals_at(distance, near, LOOKED_AT)
     if not len(normals):
         return ()
     tried = normals[:: max(1, len(normals) // TRIED)]
@@ -31,19 +31,9 @@ def flat_side(distance: Grid) -> tuple[str, ...]:
     best = int(np.argmax(share))
     if not share[best] > max(LEAST, TIMES * float(opposite[best])):
         return ()
-    way = ", ".join(f"{x:.2f}" for x in tried[best] @ distance.direction.T)
+    way = ", ".join(f"{x:.2f}" for x in tried[best])
     return (
         f"segment: {100 * share[best]:.0f} % of the vessel's wall is flat and faces one way, LPS ({way}): where that "
         "is up, the contrast medium may fill the vessel in part, and the lumen is that part; or the scan's edge cuts "
         "it, or it is made so; look at the picture, fill it, or give the lumen as a file (manifest key lumen)",
     )
-
-
-def _normals(distance: Grid) -> Array:
-    """Outward unit normals (n, 3) of the wall, along the array axes."""
-    values = distance.values
-    near = np.flatnonzero(np.abs(values) < NEAR_VOXELS * float(np.min(distance.spacing_mm)))
-    index = unflattened(near[:: max(1, len(near) // LOOKED_AT)], values.shape)
-    index = index[np.all((index > 0) & (index < np.array(values.shape) - 1), axis=1)]
-    normals = slopes_at(distance, index)
-    return np.asarray(normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9))

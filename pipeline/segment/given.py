@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.arrays.grids import in_memory_order, reorder
+from pipeline.arrays.grids import in_memory_order, lattice_mm, reorder
 from pipeline.model import Branches, Lumen, Shapes, Volume
 from pipeline.segment._kernels.distance import Owned
 from pipeline.segment._kernels.solids import cones, enclosed, splat_triangles
@@ -17,9 +17,6 @@ from pipeline.segment.levels import GreyLevels, failed
 from pipeline.segment.surface import padded_box, prepare, signed, signed_distance
 from solver.grid import Grid
 
-VOXEL_MM = 0.3
-"""Lattice of a lumen that comes without one; coarser where the box would hold more than MOST_VOXELS."""
-MOST_VOXELS = 60e6
 SMOOTHING_TAPS = np.array([0.25, 0.5, 0.25], np.float32)
 """Probabilities are smoothed by 0.7 voxel (and the spline's 0.6) before their half level is taken."""
 
@@ -35,7 +32,7 @@ def _lumen(distance: Grid, note: str) -> Lumen:
 def _empty(low: NDArray[Any], high: NDArray[Any], margin: float) -> Grid:
     """An isotropic lattice around the box from ``low`` to ``high``, mm, holding nothing yet."""
     low, size = low - margin, high - low + 2 * margin
-    voxel = max(VOXEL_MM, float(np.cbrt(np.prod(size) / MOST_VOXELS)))
+    voxel = lattice_mm(size)
     shape = tuple(int(n) for n in np.ceil(size / voxel) + 1)
     return Grid(np.broadcast_to(np.float32(0), shape), np.full(3, voxel), low)
 

@@ -11,7 +11,7 @@ from scipy import ndimage
 from scipy.special import ndtr
 
 from pipeline.arrays.edges import layer_in
-from pipeline.arrays.grids import slopes_at, spread
+from pipeline.arrays.grids import normals_at, spread
 from pipeline.model import Array, Lumen, Volume
 
 NEAR_VOXELS = 3.0
@@ -72,11 +72,7 @@ def beside_the_wall(lumen: Lumen, scan: Volume) -> LumenDoubt:
 def _near(lumen: Lumen, reach_mm: float) -> tuple[Array, Array, Array]:
     """Voxel centres (n, 3) inside and near the wall, LPS mm, with outward normal (n, 3) and signed distance (n,)."""
     grid = lumen.distance
-    near = np.flatnonzero(grid.values < reach_mm)
-    index = np.stack(np.unravel_index(near[:: max(1, len(near) // POINTS)], grid.shape), axis=1)
-    index = index[np.all((index > 0) & (index < np.array(grid.shape) - 1), axis=1)]
-    normals = slopes_at(grid, index) @ grid.direction.T
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
+    index, normals = normals_at(grid, grid.values < reach_mm, POINTS)
     return grid.to_mm(index), normals, grid.values[tuple(index.T)].astype(float)
 
 

@@ -8,7 +8,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage
 
 from pipeline.arrays.grids import spread, unflattened
@@ -93,13 +92,8 @@ def filling(grid: Grid, region: Region) -> Filling:
 def filled(grid: Grid, levels: GreyLevels, found: Filling) -> Grid:
     """The grid as if the vessel had its full contrast everywhere: grey above ``outside`` over the local share."""
     shape = np.minimum(np.array(found.share.shape) * BLOCK, np.array(grid.shape) - found.corner)
-    axes = [(np.arange(int(n)) + 0.5) / BLOCK - 0.5 for n in shape]
-    share: NDArray[np.float64] = found.share
-    for axis, at in enumerate(axes):
-        low = np.clip(np.floor(at).astype(int), 0, share.shape[axis] - 1)
-        high = np.minimum(low + 1, share.shape[axis] - 1)
-        part = np.clip(at - low, 0.0, 1.0).reshape([-1 if a == axis else 1 for a in range(3)])
-        share = np.take(share, low, axis) * (1.0 - part) + np.take(share, high, axis) * part
+    step, first = np.full(3, 1.0 / BLOCK), 0.5 / BLOCK - 0.5
+    share = ndimage.affine_transform(found.share, step, first, tuple(shape), order=1, mode="nearest")
     values = np.array(grid.values, np.float32)
     box = tuple(slice(int(c), int(c) + int(n)) for c, n in zip(found.corner, shape, strict=True))
     out = np.float32(levels.outside)

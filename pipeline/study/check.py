@@ -1,13 +1,14 @@
 """Every problem of a study at once, from the manifest and the scans' headers alone."""
 
 from collections.abc import Callable, Container, Iterator, Sequence
-from itertools import islice, product
+from itertools import islice
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pipeline.arrays.grids import corners_mm
 from pipeline.load import Header, LoadError, Scans, Source, each_volume, read_header, require_one, require_whole
 from pipeline.load.curves import read_curve, read_truth
 from pipeline.load.guard import is_folder, status_of
@@ -122,7 +123,7 @@ def _lumen_problems(case: Case, config: Config, absent: Container[Path]) -> Iter
             low, high = ends.min(axis=0), ends.max(axis=0)
         else:
             header = mask_header(case.lumen)
-            corners = header.grid.to_mm([*product(*((0, n - 1) for n in header.shape))])
+            corners = corners_mm(header.grid)
             low, high = corners.min(axis=0), corners.max(axis=0)
     except LoadError as error:
         yield str(error)

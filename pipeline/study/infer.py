@@ -77,9 +77,8 @@ def _deeper(folder: Path) -> str:
     found = [p.relative_to(folder).as_posix() for p in below if p.parent.name != "frames" and _is_scan(p)]
     if not found:
         return ""
-    names = ", ".join(found[:3]) + f" and {len(found) - 3} more" * (len(found) > 3)
     return (
-        f"; further down are scans: {names}; move each frame's own folder or file up into "
+        f"; further down are scans: {listed(found, 3)}; move each frame's own folder or file up into "
         f"{folder.resolve().name}/frames, or list them in a manifest (frames = [...])"
     )
 

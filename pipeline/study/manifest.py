@@ -26,8 +26,7 @@ from pydantic.config import JsonDict
 from pipeline.model import OverWire, Uncertainty, Wall, Wire
 from pipeline.ranges import Axis, Depth, Direction, Finite, Name, NonNegative, Number, Point, Positive, Spread, Strict
 from pipeline.status import InputError, did_you_mean
-from pipeline.study.borrowed import borrowing_problems
-from pipeline.study.catheter import catheter_problems
+from pipeline.study.case_rules import borrowing_problems, catheter_problems
 from pipeline.study.others import LONGEST_NAME, OthersText
 from pipeline.study.sources import MaskText, PathText, Sources, SourceText, read_tables
 from pipeline.wording import WRITTEN_HERE, Place, as_toml, said, saying, sentences

@@ -54,9 +54,9 @@ class Attempt:
 
     pieces : all crests that were seen; known : points (n, 3) that count as explained besides the tube's.
     behind_mm : length of the line before the path's first point, outside the entry.  goes_on : whether something faint
-    is seen past its tip.  confirmed : whether the manifest states a length.  short : whether it is hardly any of that
-    length.  agrees : whether it is that length, missing_mm : what it lacks of it, NaN for none stated.  late_mm : wire
-    missing at the entry.
+    is seen past its tip.  missing_mm : what it lacks of the depth that the manifest states, NaN for none stated.
+    short : whether it is hardly any of that depth, agrees : whether it is that depth.  late_mm : wire missing at the
+    entry.
     """
 
     tube: Tube
@@ -67,7 +67,6 @@ class Attempt:
     from_previous: bool = False
     behind_mm: float = 0.0
     goes_on: bool = False
-    confirmed: bool = False
     short: bool = False
     agrees: bool = False
     late_mm: float = 0.0
@@ -82,6 +81,11 @@ class Attempt:
     def elsewhere(self) -> Array:
         """Points (m, 3) of the crests that it does not explain."""
         return np.concatenate([np.zeros((0, 3)), *(points for points, _ in self.off)])
+
+    @property
+    def depth_stated(self) -> bool:
+        """Whether the manifest states a depth."""
+        return not np.isnan(self.missing_mm)
 
     @property
     def cut(self) -> bool:

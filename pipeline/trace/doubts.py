@@ -137,7 +137,7 @@ def doubted(image: Subtraction, attempt: Attempt, curve: Curve) -> Curve:
     """The curve of an attempt with the first of all doubts, if there is any, as its status."""
     curve = with_marks(image, attempt.tube, curve)  # for the other frames, whatever becomes of this one
     curve = ends_in_nothing(image, attempt, faint_for_its_noise(curve))
-    if curve.status is not FrameStatus.OK or attempt.confirmed:  # a stated depth says where the wire ends
+    if curve.status is not FrameStatus.OK or attempt.depth_stated:  # a stated depth says where the wire ends
         return curve
     read = along_line(image, attempt.tube)
     curve = of_one_device(image, attempt.tube, nothing_beyond(curve))

@@ -201,9 +201,9 @@ def of_the_frame(image: Subtraction) -> tuple[Objection, ...]:
 def of_the_way(attempt: Attempt, length_mm: float) -> tuple[Objection, ...]:
     """Why a curve may run the wrong way: said before all else, since what else is odd of it follows from that."""
     return (
-        (attempt.behind_mm > length_mm and (attempt.short or not attempt.confirmed), FrameStatus.TRACE_WRONG_WAY,
+        (attempt.behind_mm > length_mm and (attempt.short or not attempt.depth_stated), FrameStatus.TRACE_WRONG_WAY,
          f"{length_mm:.1f} mm of wire beyond the entry and {attempt.behind_mm:.1f} mm behind it", "more beyond it",
-         "turn entry_direction round" + ", or state insertion_mm if this is right" * (not attempt.confirmed)),
+         "turn entry_direction round" + ", or state insertion_mm if this is right" * (not attempt.depth_stated)),
     )  # fmt: skip
 
 
@@ -242,7 +242,7 @@ def of_the_whole(image: Subtraction, attempt: Attempt, points: Array, length_mm:
         (_haloed(image, attempt.tube), FrameStatus.TRACE_AMBIGUOUS,
          f"a sharp line in a halo of {attempt.tube.offset / max(attempt.tube.peak, 1e-9):.2f} of its brightness",
          f"{HALO:g} at most", "look whether the wire moved during the scan, or another one lies beside it: scan again"),
-        (turn > HAIRPIN_DEG and not attempt.confirmed, FrameStatus.TRACE_AMBIGUOUS,
+        (turn > HAIRPIN_DEG and not attempt.depth_stated, FrameStatus.TRACE_AMBIGUOUS,
          f"a turn by {turn:.0f} degrees within {HAIRPIN_VOXELS * image.voxel:.1f} mm", f"{HAIRPIN_DEG:g} at most",
          "look whether two wires lie side by side; state insertion_mm if the wire is folded"),
         (fills_vessel(image, points, attempt.tube.sigma), FrameStatus.TRACE_AMBIGUOUS,

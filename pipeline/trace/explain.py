@@ -114,9 +114,7 @@ def _read_off(image: Subtraction, attempt: Attempt | None, entry: EntryPose) -> 
     missing = np.nan if stated is None else stated - length
     agrees = abs(missing) < min(AGREES_MM, AGREES_VOXELS * image.voxel)
     short = hardly_begun(length, stated)
-    attempt = replace(
-        attempt, confirmed=stated is not None, short=short, agrees=agrees, late_mm=late, missing_mm=missing
-    )
+    attempt = replace(attempt, missing_mm=missing, short=short, agrees=agrees, late_mm=late)
     verdict = judge(image, attempt, points, _on_bridges(points, attempt, image.voxel), length)
     return [Candidate(attempt, points, *point_sigmas(attempt.tube, u), length, verdict)]
 

@@ -10,8 +10,6 @@ from pipeline.trace.tube import Tube, spline_through, tint_nodes
 
 CLOSEST = 8.0
 """Least distance between knots, voxels: closer ones only follow the noise."""
-THICK_SLICES = 1.5
-"""Largest over smallest voxel edge (as the kernels see them) from which slices count as thick."""
 KNOTS_PER_PITCH = 2.0
 """Least distance between knots, in :func:`slice_pitch`: with one knot a slice the curve follows each slice's own error
 (0.15 mm of ripple at 2.5 mm slices)."""
@@ -24,9 +22,9 @@ def slice_pitch(image: Subtraction, line: Array) -> float:
 
     Such slices are wider apart than the blur can join: between two of them the grey hardly says how high the wire is.
     """
-    axis = int(np.argmax(image.spacing))
-    if image.spacing[axis] < THICK_SLICES * image.voxel:
+    if not image.thick_slices:
         return 0.0
+    axis = int(np.argmax(image.spacing))
     slices = float(np.sum(np.abs(np.diff(line[:, axis])))) / float(image.spacing[axis])
     return float(arc_length(line)[-1]) / max(slices, 1.0)
 

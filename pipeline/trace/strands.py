@@ -16,7 +16,7 @@ ALONE = 0.15
 """Least share of a line in which one strand lies alone: 5 mm of 35."""
 OBLONG = 0.12
 """How far out of round a line of any brightness is that is no single wire; two that are two voxels apart have 0.2."""
-BESIDE_VOXELS = 2.2
+STRANDS_VOXELS = 2.2
 """Two strands of one curve nearer than this share their crest."""
 
 

@@ -34,7 +34,7 @@ from pipeline.trace.section import (
 )
 from pipeline.trace.sharpness import blur_by_axis
 from pipeline.trace.steps import Steps
-from pipeline.trace.strands import BESIDE_VOXELS, DOUBLE, doubled, of_one_strand
+from pipeline.trace.strands import DOUBLE, STRANDS_VOXELS, doubled, of_one_strand
 from pipeline.trace.subtraction import CREST_VOXELS, Subtraction
 from pipeline.trace.tube import Tube
 from pipeline.trace.width import as_fitted
@@ -169,7 +169,7 @@ def judge(image: Subtraction, attempt: Attempt, points: Array, bridged: NDArray[
     places = places_around(points, attempt.tube.sigma)
     read = read_around(image, places)
     fitted = as_fitted(image, attempt.tube, places)
-    double, pair = beside_itself(points, step, BESIDE_VOXELS * image.voxel), 0.0
+    double, pair = beside_itself(points, step, STRANDS_VOXELS * image.voxel), 0.0
     if not image.thick_slices:
         section = section_along(image, points, read)
         pair = _pair(image, section, attempt.tube, second_harmonic(fitted[0]), points)

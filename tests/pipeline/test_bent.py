@@ -12,7 +12,7 @@ from scipy.special import ndtr
 from pipeline.model import Curve, Lumen, Volume
 from pipeline.register import Anchor, Motion, Registration, anchor, register
 from pipeline.register.frames import alignment_of, record, sentences_of, widened
-from pipeline.register.patches import LEAST_POINTS, parted
+from pipeline.register.patches import PATCH_POINTS, parted
 from solver import Grid
 from tests.later import later
 
@@ -149,7 +149,7 @@ def test_patches_hold_all_points_and_go_round_the_vessel(phantom: tuple[int, Lum
     np.testing.assert_array_equal(np.sort(order), np.arange(len(points)))
     sizes = np.diff(starts, append=len(points))
     assert len(starts) % 2 == 0
-    assert sizes.min() >= LEAST_POINTS
+    assert sizes.min() >= PATCH_POINTS
     for start, size in zip(starts[::2], sizes[::2] + sizes[1::2], strict=True):
         assert np.ptp(points[order[start : start + size]], axis=0).max() <= to.patch_mm
     few, first = parted(points[:5], to.patch_mm)

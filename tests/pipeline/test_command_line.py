@@ -19,7 +19,7 @@ import pytest
 import SimpleITK as sitk
 
 from pipeline.cli import main
-from pipeline.commands.given import _is_manifest, _other_manifests
+from pipeline.commands.given import _other_manifests
 from pipeline.run.gate import Gate, gate
 from pipeline.run.guards import guard_apart
 from pipeline.status import UsageError
@@ -790,13 +790,14 @@ def test_check_sees_an_entry_direction_that_is_turned_round(study: Path, capsys:
     assert len(heard.out.splitlines()) == 1, "-q prints the result alone"
 
 
-def test_only_a_file_that_states_cases_is_another_manifest(tmp_path: Path) -> None:
+def test_only_a_file_that_states_cases_is_another_manifest(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A folder of that name was a traceback, and settings that mention [[case]] in a comment refused the scans."""
     (tmp_path / "folder.toml").mkdir()
     (tmp_path / "gone.toml").symlink_to(tmp_path / "nowhere")
     for name, text in (("settings", "# as in [[case]]\n"), ("study", "schema = 1\n[[ case ]]\n")):
         (tmp_path / f"{name}.toml").write_text(text, encoding="utf-8")
-    assert [path.name for path in sorted(tmp_path.iterdir()) if _is_manifest(path)] == ["study.toml"]
+    assert main(["check", str(tmp_path)]) == 2
+    assert "study.toml is a manifest; give that file" in capsys.readouterr().err, "the first that is one is named"
 
 
 def test_a_folder_that_holds_another_manifest_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -15,7 +15,7 @@ from scipy.interpolate import CubicSpline
 from pipeline.arrays.polyline import resample, to_length
 from pipeline.cli import main
 from pipeline.model import Curve, arc_length
-from pipeline.run.stages.beside import beside_what_is_seen, elsewhere
+from pipeline.run.stages.beside import beside_what_is_seen
 from pipeline.run.stages.known import Frame
 from pipeline.run.stages.own_curves import CORNER_VOXELS, LONGER, _in_lumen, corner_mm, known_by_tip, rough, zigzag
 from pipeline.status import FrameStatus
@@ -235,7 +235,7 @@ def test_curves_that_are_all_a_little_off_are_told(own: Callable[[Array], Array]
     wires = [np.stack([np.zeros(40), np.zeros(40), np.linspace(0.0, mm, 40)], axis=1) for mm in (20.0, 25.0, 30.0)]
     seen = [Curve(wire, np.full(40, 0.03)) for wire in wires]
     frames = [Frame(n, curve=Curve(own(wire), np.full(40, 0.03))) for n, wire in enumerate(wires)]
-    warnings = beside_what_is_seen(frames, seen, TraceConfig(), 0.4)
+    warnings, _ = beside_what_is_seen(frames, seen, TraceConfig(), 0.4)
     assert len(warnings) == bool(said)
     assert all(said in text for text in warnings)
 
@@ -246,8 +246,8 @@ def test_a_curve_that_is_not_where_the_scan_shows_the_wire_opens_no_lumen() -> N
     own, sigma = wire + np.linspace(0.0, 2.0, 40)[:, None] * [1.0, 0.0, 0.0], np.full(40, 0.03)
     frames = [Frame(0, curve=Curve(wire, sigma)), Frame(1, curve=Curve(own, sigma)), Frame(2, curve=Curve(own, sigma))]
     seen = [Curve(wire, sigma), Curve(wire, sigma), Curve(wire, sigma, status=FrameStatus.TRACE_AMBIGUOUS)]
-    assert elsewhere(frames, seen, TraceConfig(), 0.35) == {1}
-    assert elsewhere(frames, [None, None, None], TraceConfig(), 0.35) == frozenset()
+    assert set(beside_what_is_seen(frames, seen, TraceConfig(), 0.35)[1]) == {1}
+    assert not beside_what_is_seen(frames, [None, None, None], TraceConfig(), 0.35)[1]
 
 
 def test_a_share_that_is_hardly_too_large_is_not_told_as_the_share_that_is_allowed() -> None:

@@ -207,7 +207,7 @@ def traced():
     image = subtracted(frame, lumen, reference)
     entry = EntryPose(image.local(vessel()[4][None])[0], image.turned(vessel()[5] / np.linalg.norm(vessel()[5])))
     best = explain.best_of(image, entry, None, TraceConfig())
-    return image, entry, replace(best, attempt=replace(best.attempt, confirmed=True))
+    return image, entry, replace(best, attempt=replace(best.attempt, missing_mm=0.0))
 
 
 def test_wire_outside_the_entry_does_not_choose_between_two_explanations():

@@ -10,8 +10,7 @@ import pytest
 
 from reports import _content
 from reports.calibration import gained
-from reports.case_files import counted
-from reports.counts import scans
+from reports.case_files import counted, counted_scans
 from reports.doubts import said_by_cases
 from reports.schema import SWEEP
 
@@ -74,8 +73,8 @@ def test_a_tile_says_that_its_interval_is_withheld() -> None:
 
 def test_a_frame_that_the_roll_was_fitted_on_is_counted_apart() -> None:
     """Of six scans five were "5 of 5 frames"."""
-    assert scans(5, 5, 1, "scored") == "6 scans: 1 used for the roll, 5 scored"
-    assert scans(4, 5, 1, "scored") == "6 scans: 1 used for the roll, 4 scored, 1 without a result"
+    assert counted_scans(5, 5, 1, "scored") == "6 scans: 1 used for the roll, 5 scored"
+    assert counted_scans(4, 5, 1, "scored") == "6 scans: 1 used for the roll, 4 scored, 1 without a result"
     entries = [{"column": "frames_ok", "of": "frames", "label": "frames"}]
     row = {"frames_ok": 5, "frames": 5}
     assert _content.cards(entries, row | {"frames_fitted": 1})[0]["label"] == "of 5 frames (1 more used for the roll)"

@@ -21,7 +21,7 @@ from reports.junit import Outcome, write_junit
 from reports.origin import told_alike
 from reports.schema import ERRORS, POINTS, SIMULATORS
 from reports.two_runs import Verdict
-from reports.two_runs_files import _markdown
+from reports.two_runs_files import write
 from tests.reports.fake_results import FakeCase, write_run
 
 GROUPS = ("a", "b", "c")
@@ -511,12 +511,13 @@ def test_nearer_one_way_alone_is_said_with_both_intervals() -> None:
     )
 
 
-def test_a_table_of_markdown_keeps_its_columns(first: Path) -> None:
+def test_a_table_of_markdown_keeps_its_columns(first: Path, tmp_path: Path) -> None:
     from reports.diff import diff_folders
 
     frames = diff_folders(first, first, {})
     verdict = Verdict((first, first), [{"what": "a|b <c>", "before": "1", "after": "2"}], [], "", "holds", frames)
-    assert "a\\|b &lt;c&gt;" in _markdown(verdict)
+    write(verdict, markdown=tmp_path / "verdict.md")
+    assert "a\\|b &lt;c&gt;" in (tmp_path / "verdict.md").read_text(encoding="utf-8")
     assert replace(verdict, judged="worse").closed
 
 

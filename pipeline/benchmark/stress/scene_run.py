@@ -31,7 +31,6 @@ class SceneOutcome:
     detail: str = ""
     iterations: int = 0
     depths: int = 0
-    depths_converged: int = 0
     residual: float = float("nan")
     stretch: float = float("nan")
     seconds: float = 0.0
@@ -115,7 +114,6 @@ def _outcome(plan: ScenePlan, solutions: list[Solution], verdicts: list[SceneVer
         bad.detail if bad else (failed[-1].value if failed else ""),
         iterations=sum(s.iterations for s in solutions),
         depths=len(solutions),
-        depths_converged=len(solutions) - len(failed),
         residual=max((v.residual for v in verdicts if np.isfinite(v.residual)), default=float("nan")),
         stretch=max((v.stretch for v in verdicts if np.isfinite(v.stretch)), default=float("nan")),
         seconds=seconds,

@@ -1,6 +1,6 @@
 """The user's own curves beside the wires that the scans show: one of another frame, or moved, is not passed over."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -35,30 +35,22 @@ class _Off(NamedTuple):
 
 def beside_what_is_seen(
     frames: Sequence[Frame], seen: Sequence[Curve | None], config: TraceConfig, voxel_mm: float
-) -> list[str]:
-    """A warning where own curves lie off the wires that are seen, or have other lengths; says nothing of the others.
+) -> tuple[list[str], Collection[int]]:
+    """A warning where own curves lie off the wires that are seen, or have other lengths; and the frames of these.
 
-    seen : of each frame the wire that its scan shows; None where the curve of the frame is that very one.
+    For what those curves say no lumen is opened. seen : of each frame the wire that its scan shows; None where the
+    curve of the frame is that very one.
     """
     both = _both(frames, seen)
     said = _apart(both, config, voxel_mm)
     each = listed([f"frame {index}: {what}" for index, what in said.items()], MOST_NAMED)
     found = [each] * bool(said) + (_together(both, voxel_mm) if 2 * len(said) < len(both) else [])
-    return [
+    warnings = [
         f"the manifest's own curves are not where the scans show the wire ({what}): check which curve belongs to "
         "which frame, its units and LPS; without the key traces the scans are traced"
         for what in found
     ]
-
-
-def elsewhere(
-    frames: Sequence[Frame], seen: Sequence[Curve | None], config: TraceConfig, voxel_mm: float
-) -> frozenset[int]:
-    """Numbers of the frames whose own curves lie off the wires that are seen: no lumen is opened for what they say.
-
-    seen : as in ``beside_what_is_seen``.
-    """
-    return frozenset(_apart(_both(frames, seen), config, voxel_mm))
+    return warnings, said.keys()
 
 
 def _both(frames: Sequence[Frame], seen: Sequence[Curve | None]) -> list[_Off]:

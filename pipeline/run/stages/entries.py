@@ -25,7 +25,7 @@ Entry = tuple[Clamp, str]
 
 def _frames(known: Known) -> list[Frame]:
     """The frames that are compared: ok, traced and simulated."""
-    return [f for f in known.frames if f.ok and f.traced and f.simulated is not None and len(f.simulated.joints_mm) > 1]
+    return [f for f in known.frames if f.ok and f.traced and f.simulated_wire is not None]
 
 
 def _entries(run: Context, known: Known) -> dict[tuple[str, str], Entry]:

@@ -18,7 +18,7 @@ from pipeline.run.helpers import Earlier
 from pipeline.run.log import Log
 from pipeline.run.projections import grey_window, projections
 from pipeline.run.stages.before import NOTHING, Before
-from pipeline.run.stages.beside import beside_what_is_seen, elsewhere
+from pipeline.run.stages.beside import beside_what_is_seen
 from pipeline.run.stages.brightness import of_another_brightness
 from pipeline.run.stages.depths import (
     drawn_back,
@@ -77,15 +77,15 @@ def trace_frames(run: Context, known: Known) -> Known:
     run.log.warnings += [*too_thin(frames, known.vessel, radius_mm), *of_another_brightness(frames, radius_mm)]
     if not given:
         run.log.warnings += cut_off(trusted(frames))
-    seen = [part.seen for part in parts]
-    run.log.warnings += beside_what_is_seen(frames, seen, run.config.trace, voxel_mm)
+    off_scans, elsewhere = beside_what_is_seen(frames, [part.seen for part in parts], run.config.trace, voxel_mm)
+    run.log.warnings += off_scans
     run.log.warnings += work.wire_in_reference
     run.log.warnings += _in_plane(frames, run.config.trace)
     assumed, doubtful = sentences_of(work.alignment, {frame.index: frame.registration for frame in frames})
     run.log.assumptions += assumed
     run.log.warnings += doubtful + of_drift({f.index: f.curve for f in frames if f.curve is not None})
     frames = [_first_said(frame, known.lumen_doubt) for frame in frames]
-    return _with_room(run, known, frames, elsewhere(frames, seen, run.config.trace, voxel_mm))
+    return _with_room(run, known, frames, elsewhere)
 
 
 def _in_step(run: Context, frames: list[Frame], voxel_mm: float) -> list[Frame]:
@@ -185,20 +185,15 @@ class _Tracing:
         """Trace one frame; it has failed where its scan cannot be read."""
         run, frame = self.run.part(), self.frames[number]
         try:
-            done, window, seen = self.look(run, frame, self.headers[number], earlier)
+            done = self.look(run, frame, self.headers[number], earlier)
         except StageError as error:
             return _Part(frame.failed("load", error), None, run.log)
-        length = 0.0 if done.curve is None else done.curve.length_mm
-        run.log.progress("trace", number + 1, len(self.frames), f"{done.status} {length:.1f} mm")
-        return _Part(done, window, run.log, seen)
+        length = 0.0 if done.frame.curve is None else done.frame.curve.length_mm
+        run.log.progress("trace", number + 1, len(self.frames), f"{done.frame.status} {length:.1f} mm")
+        return done
 
-    def look(
-        self, run: Context, frame: Frame, header: Header, earlier: Earlier[_Part]
-    ) -> tuple[Frame, tuple[float, float] | None, Curve | None]:
-        """Read, align and trace one frame; also the grey window that frames so far have set, and ``_Part.seen``.
-
-        LoadError where it cannot be read.
-        """
+    def look(self, run: Context, frame: Frame, header: Header, earlier: Earlier[_Part]) -> _Part:
+        """Read, align and trace one frame; LoadError where it cannot be read."""
         log = run.log
         volume = run.load(Crop(header, self.box, self.load), frame.index)
 
@@ -221,7 +216,8 @@ class _Tracing:
         window = next((part.window for part in before if part.window), None)
         if window is None and done.trusted_curve is not None:
             window = grey_window(shown, done.trusted_curve.points_mm)
-        return _pictured(done, shown, window or grey_window(shown)), window, seen if self.given else None
+        done = _pictured(done, shown, window or grey_window(shown))
+        return _Part(done, window, log, seen if self.given else None)
 
     def follow(self, run: Context, frame: Frame, here: Volume, earlier: Earlier[_Part]) -> Curve:
         """The wire that the scan of a frame shows."""

@@ -28,7 +28,7 @@ Wires = list[Array | None]
 
 def simulated_frames(known: Known) -> list[Frame]:
     """The frames with a simulated wire of more than a point."""
-    return [f for f in known.frames if f.simulated is not None and len(f.simulated.joints_mm) > 1]
+    return [f for f in known.frames if f.simulated_wire is not None]
 
 
 class SimulatedVariant(NamedTuple):

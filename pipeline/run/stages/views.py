@@ -71,15 +71,15 @@ def _clues(run: Context, known: Known) -> Clues | None:
 def _compared(
     frame: Frame, clues: Clues | None, seen: PredictorInputs, config: CompareConfig, tolerance_mm: float
 ) -> Frame:
-    view = frame.view
-    if view is None or clues is None or frame.simulated is None or len(frame.simulated.joints_mm) < 2:
+    view, wire = frame.view, frame.simulated_wire
+    if view is None or clues is None or wire is None:
         return frame
-    screen, wire = screen_seen(view), np.asarray(frame.simulated.joints_mm)
+    screen = screen_seen(view)
     guesses = {name: guess(clues, frame.depth_mm, seen) for name, guess in NULLS.items() if name not in TOLD}
     known_wires = {name: guess for name, guess in guesses.items() if guess is not None}
     try:
         require_in_order(screen, view.points_px, frame.index)
-        pair = pair_in(screen, wire, view.fitted, clues.lumen, clues.way, config)
+        pair = pair_in(screen, np.asarray(wire.joints_mm), view.fitted, clues.lumen, clues.way, config)
         _require_to_depth(frame, view, pair.wire_mm[0], clues, tolerance_mm)
         nulls = nulls_in(screen, known_wires, view.fitted, config)
     except ValueError as error:
