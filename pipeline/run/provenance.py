@@ -15,7 +15,18 @@ from typing import Any
 from pipeline.run import ledger
 from reports.records import read_json
 
-PACKAGES = ("numpy", "scipy", "scikit-image", "SimpleITK", "pandas", "h5py", "matplotlib", "numba", "pydantic")
+PACKAGES = [
+    "numpy",
+    "scipy",
+    "scikit-image",
+    "SimpleITK",
+    "pydicom",
+    "pandas",
+    "h5py",
+    "matplotlib",
+    "numba",
+    "pydantic",
+]
 
 
 def package_version() -> str:
@@ -35,8 +46,8 @@ def _git(*args: str) -> str:
 
 
 @cache
-def _versions() -> dict[str, str]:
-    """Of what was imported; read once a process: it takes 20 ms, and every case asks."""
+def versions() -> dict[str, str]:
+    """Of the libraries; read once a process: it takes 20 ms, and every case asks."""
     return {name: version(name) for name in PACKAGES}
 
 
@@ -59,7 +70,7 @@ def code_state() -> dict[str, Any]:
         "git_commit": commit,
         "git_dirty": bool(commit and _git("status", "--porcelain", "--untracked-files=no")),
         "python": platform.python_version(),
-        "versions": dict(_versions()),
+        "versions": dict(versions()),
     }
 
 

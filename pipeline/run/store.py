@@ -1,8 +1,8 @@
 """The keys of the store of stage results: a stage whose inputs and code have not changed is not computed again.
 
-The key of a result is a hash of everything that it depends on, and of the code that made it: it is made from the values
-that a stage is called with, so nothing can be forgotten. A file counts by its content, never by its name or time, so
-that moving a study recomputes nothing.
+The key of a result is a hash of everything that it depends on, of the code that made it and of the libraries' versions:
+it is made from the values that a stage is called with, so nothing can be forgotten. A file counts by its content and by
+the code that reads it, never by its name or time, so that moving a study recomputes nothing.
 """
 
 import hashlib
@@ -17,8 +17,10 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from pydantic import BaseModel
 
+from pipeline import load
 from pipeline.model import Volume
 from pipeline.run.hashing import file_hash
+from pipeline.run.provenance import versions
 from solver import Grid
 from solver._compile import hash_of
 
@@ -26,9 +28,9 @@ _known: WeakKeyDictionary[Grid, str] = WeakKeyDictionary()
 
 
 def key_of(stage: Callable[..., Any], *inputs: Any) -> str:
-    """Key of what ``stage(*inputs)`` returns: its sources, and its inputs' contents."""
+    """Key of what ``stage(*inputs)`` returns: its sources, the libraries, and its inputs' contents."""
     code = hash_of(Path(inspect.unwrap(stage).__code__.co_filename))
-    return hashlib.sha256(f"{stage.__qualname__} {code} {digest(inputs)}".encode()).hexdigest()
+    return hashlib.sha256(f"{stage.__qualname__} {code} {versions()} {digest(inputs)}".encode()).hexdigest()
 
 
 def digest(value: Any) -> str:
@@ -64,8 +66,11 @@ def _parts(value: Any) -> Iterator[tuple[str, Any]]:
     elif isinstance(value, BaseModel):
         yield from value
     elif is_dataclass(value):
-        # a volume's source stands for its values: its key is cheaper to make
-        left_out = {"values"} if isinstance(value, Volume) and value.made_of is not None else set()
+        left_out = set()
+        if isinstance(value, Volume) and value.made_of is not None:
+            # a volume's source, and what read it, stand for its values: their key is cheaper to make
+            left_out = {"values"}
+            yield "read by", hash_of(Path(load.__file__))
         yield from ((f.name, getattr(value, f.name)) for f in fields(value) if f.name not in left_out)
     elif isinstance(value, Mapping):
         yield from ((str(name), value[name]) for name in sorted(value, key=str))

@@ -31,7 +31,7 @@ from solver.grid import Grid, read_only
 __all__ = ["segment"]
 
 METHOD = fuzzy_region
-"""How the vessel's voxels are found: (grid, seeds_mm, config) -> Region."""
+"""How the vessel's voxels are found: a function with the arguments of ``fuzzy_region`` that returns a Region."""
 
 
 ON_THE_WIRE = (

@@ -8,8 +8,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from pipeline import load
 from pipeline.commands import complain
-from pipeline.model import Curve, Lumen
+from pipeline.model import Curve, Lumen, Volume
 from pipeline.run import store as store_keys
 from pipeline.run.cache import Store
 from pipeline.run.hashing import file_hash
@@ -20,6 +21,7 @@ from pipeline.segment.config import SegmentConfig
 from pipeline.status import FrameStatus
 from pipeline.study.settings import Config, SettingsError, parse_assignment, read_settings, resolve, to_toml
 from pipeline.trace import trace
+from solver._compile import hash_of
 from solver.grid import Grid
 
 
@@ -84,6 +86,18 @@ def test_keys_follow_contents_and_settings_not_paths(tmp_path: Path) -> None:
     assert first != key_of(trace, a, SegmentConfig())
     assert key_of(segment, np.array([1.0])) != key_of(segment, np.array([1.0 + 1e-15 * 4]))
     assert Config() == Config()
+
+
+def test_keys_follow_the_code_that_reads_and_the_libraries(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whoever took over a mended reader, or another SimpleITK, kept lumens of voxels that were read wrong."""
+    scan = Volume(np.zeros((2, 2, 2), np.int16), made_of="a file's hash")
+    first = key_of(segment, scan)
+    monkeypatch.setattr(store_keys, "versions", lambda: {"SimpleITK": "another"})
+    assert key_of(segment, scan) != first
+    monkeypatch.undo()
+    monkeypatch.setattr(store_keys, "hash_of", lambda file: "mended" if file == Path(load.__file__) else hash_of(file))
+    monkeypatch.setattr(store_keys, "_known", {})
+    assert key_of(segment, scan) != first
 
 
 def test_what_has_no_known_content_is_refused_in_a_key() -> None:
