@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from scipy.special import bdtrc, ndtr, stdtrit
 
 from pipeline.arrays.grids import spread
-from pipeline.model import Array, Clamp
+from pipeline.model import Array, Clamp, Doubt
 from pipeline.run.stages.known import Frame
 from pipeline.simulate.clamp import TIP_VOXELS, depth_from
 from pipeline.status import FrameStatus
@@ -174,8 +174,8 @@ def turned_round(frames: Sequence[Frame]) -> list[Frame]:
         f"trace: wire: got more of it behind the entry than beyond it in {len(back)} of {len(frames)} frames; expected "
         "more beyond it; entry_direction seems to be reversed: it points the way the wire is pushed; turn it round"
     )
-    wrong = FrameStatus.TRACE_WRONG_WAY
-    return [f if f.curve is None else f.cleared(f.curve).failed("trace", wrong, note) for f in frames]
+    why = (Doubt(FrameStatus.TRACE_WRONG_WAY, note),)
+    return [f if f.curve is None else f.cleared(replace(f.curve, doubts=why)) for f in frames]
 
 
 def shrinking(frames: Sequence[Frame], voxel_mm: float) -> list[str]:
