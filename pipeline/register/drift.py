@@ -11,6 +11,7 @@ import numpy as np
 from pipeline.model import Curve, Volume
 from pipeline.register import BAD_MISFIT_VOXELS, LEAST_POINTS, Anchor, Motion, register
 from pipeline.register.shift import farthest, look
+from reports.case_files import frames_named
 
 DRIFT = "drift_voxels"
 """Level of a curve in whose scan the phantom lies elsewhere than in the first frame: by how many voxels at most."""
@@ -58,7 +59,7 @@ def of_drift(curves: Mapping[int, Curve]) -> list[str]:
         return []
     worst = max(moved, key=lambda n: moved[n])
     return [
-        f"frame{'s' * (len(moved) > 1)} {', '.join(map(str, moved))}: the phantom moved since frame 0, by "
+        f"{frames_named([*moved])}: the phantom moved since frame 0, by "
         f"{moved[worst]:.1f} voxels (frame {worst}), and without a reference scan nothing was registered: lumen and "
         f"entry are those of frame 0, traces lie off by as much; {DO}"
     ]

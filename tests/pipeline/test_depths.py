@@ -179,7 +179,7 @@ def test_frames_that_are_exchanged_by_less_than_any_tolerance_are_a_warning() ->
     assert drawn_back(frames([20.0, 10.0], [20.0, 10.0]), 0.5) == [], "pulled back as stated"
     many = [20.0 + 0.8 * i for i in range(36)]
     (one,) = drawn_back(frames([*many[:14], many[15], many[14], *many[16:]], many), 0.3)
-    assert one.startswith("frames 15 (-0.80 mm, stated +0.80 mm): "), "one pair of thirty-six, 9 standard deviations"
+    assert one.startswith("frame 15 (-0.80 mm, stated +0.80 mm): "), "one pair of thirty-six, 9 standard deviations"
     assert drawn_back(frames([20.0, 10.0], [float("nan")] * 2), 0.5) == []
 
 

@@ -135,7 +135,7 @@ def test_what_lay_ahead_of_the_tip_in_another_frame_is_no_wire():
 def test_a_gap_that_nothing_explains_is_a_warning_and_a_stated_depth_ends_all_doubt():
     found, said = own_gaps(gapped([40.0], [10.0]), 0.3)
     assert found[0].ok
-    assert "frames 0 (10.0 mm)" in said[0]
+    assert said[0].startswith("frame 0 (10.0 mm): so much")
     assert "state insertion_mm" in said[0]
     stated = [replace(f, expected_mm=40.0) for f in found]
     assert own_gaps(stated, 0.3) == (stated, [])

@@ -6,7 +6,7 @@ import numpy as np
 
 from pipeline.run.stages.known import Frame, trusted
 from pipeline.trace import DIM_FROM_TIP, FAINT_BEYOND, GOES_ON
-from reports.case_files import listed
+from reports.case_files import frames_named, listed
 
 FEWEST = 3
 """Frames that must agree."""
@@ -53,7 +53,7 @@ def faint_ends(frames: Sequence[Frame]) -> list[str]:
     if len(go_on) < GO_ON or not 0 < len(others) <= MOST_OTHERS * len(go_on):
         return []
     return [
-        f"in frames {listed(go_on)} a line goes on {GOES_ON}: the wire's end may be too faint in {listed(others)}, "
+        f"in {frames_named(go_on)} a line goes on {GOES_ON}: the wire's end may be too faint in {listed(others)}, "
         "too, whose traces then end short of it, with a sigma that does not say so; state insertion_mm (mm) of each "
         "frame, or the wire's opacity"
     ]
@@ -65,9 +65,9 @@ def barely_seen(frames: Sequence[Frame]) -> list[str]:
     shares = {n: c.levels[FAINT_BEYOND] for n, c in trusted(unstated).items() if FAINT_BEYOND in c.levels}
     if not shares:
         return []
-    several = f"frame{'s' * (len(shares) > 1)} {listed([*map(str, shares)])}"
     return [
-        f"beyond the traced tip of {several} something goes on, {max(shares.values()):.2g} times as bright as the wire "
+        f"beyond the traced tip of {frames_named([*shares])} something goes on, "
+        f"{max(shares.values()):.2g} times as bright as the wire "
         "at most: a streak of it, or an end that is so faint, without which the trace is short; look there, and state "
         "insertion_mm (mm) of each frame, or the wire's opacity"
     ]

@@ -13,7 +13,7 @@ from pipeline.model import Curve, arc_length
 from pipeline.run.stages.known import Frame, trusted
 from pipeline.status import FrameStatus
 from pipeline.trace import BEYOND_GAP, GAP
-from reports.case_files import listed
+from reports.case_files import frames_named, listed
 
 FEWEST = 3
 """Frames that must agree on a gap."""
@@ -53,7 +53,7 @@ def own_gaps(frames: Sequence[Frame], voxel_mm: float) -> tuple[list[Frame], lis
     if not odd:
         return out, []
     return out, [
-        f"frames {', '.join(odd)}: so much of the traced wire lies beyond a gap in it, and a second device that faces "
+        f"{frames_named(odd)}: so much of the traced wire lies beyond a gap in it, and a second device that faces "
         f"the wire's tip would look the same: look at the picture, or state insertion_mm{_at_one_place(out, voxel_mm)}"
     ]
 

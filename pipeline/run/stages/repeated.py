@@ -16,7 +16,7 @@ from pipeline.compare.metrics import point_to_curve, rms
 from pipeline.model import Array, Curve
 from pipeline.run.stages.known import Frame, trusted
 from pipeline.status import FrameStatus
-from reports.case_files import listed
+from reports.case_files import frames_named
 
 ALIKE = 0.4
 """Distance between two traces over their standard deviation, below which they are of one wire that lay still: two scans
@@ -80,7 +80,7 @@ def rescanned(frames: Sequence[Frame], traced_mm: Sequence[ArrayLike]) -> list[s
     if not again:
         return []
     return [
-        f"frames {listed([*map(str, again)])} lie where scans that were calibrated with do, as one insertion does that "
+        f"{frames_named([*again])} lie where scans that were calibrated with do, as one insertion does that "
         "is scanned again: what has taught the parameters is no test of them; take it out, unless the wire was drawn "
         "out and pushed in again between the scans"
     ]
@@ -107,7 +107,7 @@ def scanned_twice(frames: Sequence[Frame], traced_mm: Sequence[ArrayLike], case:
     """
     again = _again(frames, _learnt(traced_mm), ONE_WIRE)
     return [
-        f"frames {listed([*map(str, again)])} lie where those of case {case!r} do, and count as another insertion: "
+        f"{frames_named([*again])} lie where those of case {case!r} do, and count as another insertion: "
         "if it is one that was scanned again, state the same group for both"
     ] * bool(again)
 
