@@ -4,8 +4,8 @@ Frozen dataclasses of read-only arrays; a Solution is the solver's own, a Compar
 Points are LPS mm, shape (n, 3), float64, ordered from entry to tip.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
@@ -200,6 +200,18 @@ def arc_length(points_mm: NDArray[Any]) -> Array:
     return np.concatenate([[0.0], np.cumsum(steps)])
 
 
+@dataclass(frozen=True)
+class Doubt:
+    """Why a curve is not to be trusted: its status and note in the report.
+
+    of : the level that frames at other depths may show to be the wire's own; empty where they settle nothing.
+    """
+
+    status: FrameStatus
+    note: str
+    of: str = ""
+
+
 @dataclass(frozen=True, eq=False)
 class Curve:
     """A traced wire. points_mm (n, 3) from entry to tip; n = 0 when ``status`` says that there is none.
@@ -212,14 +224,15 @@ class Curve:
     marks_mm : (k, 3) points as bright as the wire in the lumen beyond the curve's end.
     brightness : (n,) the line's grey above its background, summed across it, grey mm2; contrast : grey of the scan in
     the lumen above that around it. Empty and NaN where no scan was traced.
+    doubts : the first is its status and note; those that no other frame settles come before the others.
+    source : the file of a curve that was given.
     """
 
     points_mm: Array
     sigma_mm: Array
     tip_sigma_mm: float = float("nan")
     flagged: NDArray[np.bool_] | None = None
-    status: FrameStatus = FrameStatus.OK
-    note: str = ""
+    doubts: tuple[Doubt, ...] = ()
     counters: Counters = field(default_factory=dict)
     in_plane: NDArray[np.bool_] | None = None
     levels: Levels = field(default_factory=dict)
@@ -227,6 +240,7 @@ class Curve:
     marks_mm: Array = field(default_factory=lambda: np.zeros((0, 3)))
     brightness: Array = field(default_factory=lambda: np.zeros(0))
     contrast: float = float("nan")
+    source: str = ""
 
     def __post_init__(self) -> None:
         """Freeze the arrays."""
@@ -236,6 +250,34 @@ class Curve:
             marks = getattr(self, name)
             marks = np.zeros(len(self.points_mm), bool) if marks is None else marks
             object.__setattr__(self, name, read_only(marks, bool))
+
+    @property
+    def status(self) -> FrameStatus:
+        """Outcome of the trace."""
+        return self.doubts[0].status if self.doubts else FrameStatus.OK
+
+    @property
+    def note(self) -> str:
+        """What the report says of the status; empty where it is OK."""
+        return self.doubts[0].note if self.doubts else ""
+
+    @property
+    def refused(self) -> bool:
+        """Whether it has a doubt that no other frame settles: nothing more is asked of it."""
+        return bool(self.doubts) and not self.doubts[0].of
+
+    def doubted(self, status: FrameStatus, note: str, of: str = "") -> "Curve":
+        """The same curve with one doubt more."""
+        doubts = sorted((*self.doubts, Doubt(status, note, of)), key=lambda doubt: bool(doubt.of))
+        return replace(self, doubts=tuple(doubts))
+
+    def without(self, of: str) -> "Curve":
+        """The same curve without its doubt of this level: what else is doubted remains."""
+        return replace(self, doubts=tuple(doubt for doubt in self.doubts if doubt.of != of))
+
+    def reworded(self, words: Callable[[str], str]) -> "Curve":
+        """The same curve with the notes of its doubts in other words."""
+        return replace(self, doubts=tuple(replace(doubt, note=words(doubt.note)) for doubt in self.doubts))
 
     @property
     def length_mm(self) -> float:

@@ -19,7 +19,7 @@ from reports.texts import size_of
 GOOD = ("ok", "simulated", "roll_fitted")
 WORST = "p95_mm"
 """The one metric by which a frame or a case is called worst, wherever that is said."""
-_MOST_NAMED = 5
+_MOST_NAMED, _MOST_FRAMES = 5, 12
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -194,6 +194,11 @@ def listed(names: Sequence[str], most: int = _MOST_NAMED) -> str:
     """Names in a sentence, no more than a few."""
     rest = len(names) - most
     return ", ".join(names[:most]) + f" and {rest} more" * (rest > 0)
+
+
+def frames_named(which: Sequence[int | str], most: int = _MOST_FRAMES) -> str:
+    """``frame 1``, ``frames 1, 2``: frames in a sentence, no more than a dozen."""
+    return f"frame{'s' * (len(which) != 1)} {listed([*map(str, which)], most)}"
 
 
 def counted(count: int, noun: str) -> str:

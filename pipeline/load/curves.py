@@ -154,7 +154,7 @@ def read_curve(path: Path) -> Curve:
         points = distinct(points)
     if len(points) < 2:
         raise refused(path, f"{len(points)} points", "two or more, all finite", "correct the file")
-    return Curve(points, np.full(len(points), np.nan), note=f"given: {path.name}")
+    return Curve(points, np.full(len(points), np.nan), source=f"given: {path.name}")
 
 
 def read_truth(path: Path, frame_count: int | None) -> list[Array]:

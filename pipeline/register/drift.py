@@ -11,7 +11,7 @@ import numpy as np
 from pipeline.model import Curve, Volume
 from pipeline.register import BAD_MISFIT_VOXELS, WALL_POINTS, Anchor, Motion, register
 from pipeline.register.shift import farthest, look
-from pipeline.status import FrameStatus
+from reports.case_files import frames_named
 
 DRIFT = "drift_voxels"
 """Level of a curve in whose scan the phantom lies elsewhere than in the first frame: by how many voxels at most."""
@@ -28,15 +28,15 @@ def with_drift(curve: Curve, frame: Volume, first: Anchor | None) -> Curve:
     """
     if first is None or len(first.wall.points_mm) < WALL_POINTS:
         return curve
-    refused = curve.status is not FrameStatus.OK
-    voxels = _since(frame, first, doubted=refused)
+    voxels = _since(frame, first, doubted=bool(curve.doubts))
     if np.isnan(voxels):
-        return replace(curve, note=curve.note + PERHAPS * refused)
+        return curve.reworded(lambda note: note + PERHAPS)
     if voxels < MOVED_VOXELS:
         return curve
     why = f"trace: phantom: got a motion of {voxels:.1f} voxels since frame 0; expected {MOVED_VOXELS:g} at most, as "
-    why += f"without a reference scan nothing is registered; {DO} (what follows from it: {curve.note})"
-    return replace(curve, levels={**curve.levels, DRIFT: voxels}, note=why if refused else curve.note)
+    why += f"without a reference scan nothing is registered; {DO} (what follows from it: "
+    curve = curve.reworded(lambda note: f"{why}{note})")
+    return replace(curve, levels={**curve.levels, DRIFT: voxels})
 
 
 def _since(frame: Volume, first: Anchor, *, doubted: bool) -> float:
@@ -59,7 +59,7 @@ def of_drift(curves: Mapping[int, Curve]) -> list[str]:
         return []
     worst = max(moved, key=lambda n: moved[n])
     return [
-        f"frame{'s' * (len(moved) > 1)} {', '.join(map(str, moved))}: the phantom moved since frame 0, by "
+        f"{frames_named([*moved])}: the phantom moved since frame 0, by "
         f"{moved[worst]:.1f} voxels (frame {worst}), and without a reference scan nothing was registered: lumen and "
         f"entry are those of frame 0, traces lie off by as much; {DO}"
     ]

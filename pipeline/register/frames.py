@@ -11,6 +11,7 @@ from pipeline.register import Anchor, Registration, anchor, register
 from pipeline.register.bent import Bent
 from pipeline.register.rigid import Motion
 from reports.alike import in_words
+from reports.case_files import frames_named
 
 HIDES = (
     "the vessel's wall hardly shows a motion of the phantom along, or about, the vessel itself, as that of a straight "
@@ -102,11 +103,10 @@ def _bent(found: Sequence[tuple[int, Bent]]) -> list[str]:
     number, worst = max(found, key=lambda pair: pair[1].rms_voxels)
     place = ", ".join(f"{x:.1f}" for x in worst.worst_mm)
     return [
-        f"frame{'s' * (len(found) > 1)} {', '.join(str(n) for n, _ in found)}: the vessel's wall fits no rigid motion "
-        f"of the phantom, up to {worst.rms_voxels:.2f} voxel rms are left (frame {number}, {worst.most_voxels:.2f} at "
-        f"LPS mm ({place})): it is soft and bends, the wire pushes it aside, or slices of the scan lie "
-        "aside; traces may lie beside the lumen by as much, which trace_sigma_mm includes; hold the vessel in place "
-        "all along, and scan it anew"
+        f"{frames_named([n for n, _ in found])}: the vessel's wall fits no rigid motion of the phantom, up to "
+        f"{worst.rms_voxels:.2f} voxel rms are left (frame {number}, {worst.most_voxels:.2f} at LPS mm ({place})): it "
+        "is soft and bends, the wire pushes it aside, or slices of the scan lie aside; traces may lie beside the lumen "
+        "by as much, which trace_sigma_mm includes; hold the vessel in place all along, and scan it anew"
     ]
 
 

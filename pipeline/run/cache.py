@@ -19,7 +19,7 @@ from zipfile import BadZipFile
 
 import numpy as np
 
-from pipeline.model import Curve, Lumen
+from pipeline.model import Curve, Doubt, Lumen
 from pipeline.status import FrameStatus
 from reports.atomic import replacing, write_text
 from solver.grid import Grid, read_only
@@ -160,7 +160,7 @@ def encoded(key: str, result: Lumen | Curve) -> bytes:
     named = vars(result.distance) if isinstance(result, Lumen) else vars(result)
     arrays: dict[str, Any] = {name: value for name, value in named.items() if isinstance(value, np.ndarray)}
     rest = {name: value for name, value in vars(result).items() if name not in (*arrays, "distance")}
-    text = json.dumps(rest, default=lambda status: status.name)
+    text = json.dumps(rest, default=lambda part: vars(part) if isinstance(part, Doubt) else part.name)
     file = io.BytesIO()
     np.savez(file, json=np.array(text), **arrays)
     return _seal(key, file.getvalue()) + file.getvalue()
@@ -176,7 +176,8 @@ def decoded(stage: str, key: str, content: bytes) -> Lumen | Curve:
         rest = json.loads(str(data["json"]))
     if stage == "segment":
         return Lumen(Grid(**arrays), **rest | {"warnings": tuple(rest["warnings"])})
-    return Curve(**arrays, **rest | {"status": FrameStatus[rest["status"]]})
+    doubts = tuple(Doubt(**doubt | {"status": FrameStatus[doubt["status"]]}) for doubt in rest["doubts"])
+    return Curve(**arrays, **rest | {"doubts": doubts})
 
 
 def _seal(key: str, body: bytes) -> bytes:

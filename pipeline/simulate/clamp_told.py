@@ -8,6 +8,7 @@ from scipy.spatial import cKDTree
 
 from pipeline.arrays.polyline import angle_deg, resample
 from pipeline.model import Clamp, Curve
+from reports.case_files import counted, frames_named
 
 REACH_MM = 10.0
 """Length of wire behind the entry that is fitted: a trace's error of 0.02 mm turns it by a tenth of a degree."""
@@ -35,12 +36,11 @@ def clamp_told(given: Clamp, found: Clamp, left: str, used: int, contradiction: 
         return replace(given, warning=warning)
     if not used:
         return replace(found, warning="no frame tells where the wire is held: the manifest's entry was kept")
-    frames = f"{used} frame{'s' * (used != 1)}"
     note = (
-        f"the clamp was estimated from {frames}: the solver's wire fitted to the first {REACH_MM:g} mm of the traces, "
-        f"weighed with the manifest's entry; {offset}, known to {found.sigma_mm:.3f} mm across the wire and "
-        f"{found.sigma_deg:.2f} degrees (one standard deviation along each axis; simulate.entry = manifest switches "
-        "this off); along the wire, where a straight wire shows nothing, it stays in the manifest's plane"
+        f"the clamp was estimated from {counted(used, 'frame')}: the solver's wire fitted to the first {REACH_MM:g} mm "
+        f"of the traces, weighed with the manifest's entry; {offset}, known to {found.sigma_mm:.3f} mm across the "
+        f"wire and {found.sigma_deg:.2f} degrees (one standard deviation along each axis; simulate.entry = manifest "
+        "switches this off); along the wire, where a straight wire shows nothing, it stays in the manifest's plane"
     )
     return replace(found, note=note, warning="; ".join(filter(None, (left, contradiction))))
 
@@ -52,7 +52,7 @@ def left_out(curves: Mapping[int, Curve], out: Sequence[int], used: int) -> str:
     """
     if not out:
         return ""
-    what = f"the first {REACH_MM:g} mm of the traces of frame{'s' * (len(out) != 1)} {', '.join(map(str, out))}"
+    what = f"the first {REACH_MM:g} mm of the traces of {frames_named(out)}"
     if len(out) < used:
         apart = _apart_mm([curve for n, curve in curves.items() if n not in out], [curves[n] for n in out])
         return (

@@ -7,6 +7,7 @@ import numpy as np
 from pipeline.arrays.polyline import angle_deg, at_arc
 from pipeline.model import Array, Clamp, Curve, arc_length
 from pipeline.simulate.evidence import UNKNOWN_VOXELS
+from reports.case_files import counted
 
 FAR_OFF = 3.0
 """Standard deviations beyond which a statement is called contradicted: chance alone goes there once in a hundred."""
@@ -57,8 +58,8 @@ def beside(curves: Sequence[Curve], given: Clamp, sigma_mm: float, voxel_mm: flo
     if off <= FAR_OFF * known:
         return ""
     return (
-        f"the traced wires pass {off:.2f} mm beside the manifest's entry (median of {len(starts)} "
-        f"frame{'s' * (len(starts) != 1)}), {off / known:.0f} times the {known:.2g} mm that entry_sigma_mm = "
+        f"the traced wires pass {off:.2f} mm beside the manifest's entry (median of "
+        f"{counted(len(starts), 'frame')}), {off / known:.0f} times the {known:.2g} mm that entry_sigma_mm = "
         f"{sigma_mm:.3g} and a trace's own error allow; the wire is simulated from the manifest's entry all the same: "
         "check entry_mm, or let the clamp be estimated (a larger entry_sigma_mm and simulate.entry = traced)"
     )
@@ -76,11 +77,10 @@ def turned(pairs: Sequence[tuple[Array, Array]]) -> str:
     off = angle_deg(traced, simulated)
     if not off > TURNED_DEG:
         return ""
-    frames = f"{len(both)} frame{'s' * (len(both) != 1)}"
     return (
         f"in their first {FIRST_MM[1]:g} mm the traced wires point {off:.0f} degrees away from the simulated ones "
-        f"(median of {frames}), which leave in entry_direction as stated: check it, or let the clamp be estimated "
-        "(a larger entry_direction_sigma_deg and simulate.entry = traced)"
+        f"(median of {counted(len(both), 'frame')}), which leave in entry_direction as stated: check it, or let "
+        "the clamp be estimated (a larger entry_direction_sigma_deg and simulate.entry = traced)"
     )
 
 

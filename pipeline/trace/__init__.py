@@ -22,7 +22,7 @@ from pipeline.trace.rotation_plane import near_rotation_plane
 from pipeline.trace.stated import Opacity
 from pipeline.trace.subtraction import subtracting
 from pipeline.trace.verdict import note_of
-from pipeline.trace.whose_end import BEYOND_GAP, DIM_FROM_TIP, GAP, cleared
+from pipeline.trace.whose_end import BEYOND_GAP, DIM_FROM_TIP, GAP
 
 __all__ = [
     "BEYOND_GAP",
@@ -30,7 +30,6 @@ __all__ = [
     "FAINT_BEYOND",
     "GAP",
     "GOES_ON",
-    "cleared",
     "hardly_begun",
     "of_catheter",
     "of_length",
@@ -87,7 +86,7 @@ def trace(
             curve = again
     if len(curve.points_mm) == 0:
         line = brightest_line(frame, reference, stated.point)
-        return replace(curve, note=f"{curve.note}; {line}") if line else curve
+        return curve.reworded(lambda note: f"{note}; {line}") if line else curve
     axis = np.asarray(config.rotation_axis, float) if config.rotation_axis else frame.direction[:, 2]
     in_plane = near_rotation_plane(curve.points_mm, axis, config.in_plane_deg)
     in_plane_mm = float(in_plane.mean()) * curve.length_mm
@@ -101,7 +100,7 @@ def _seen(
     """The wire of a frame, by its reference and lumen. stated : in LPS."""
     frame, reference, lumen = scans
     if not shows_lumen(frame, lumen):
-        return Curve(np.zeros((0, 3)), np.zeros(0), status=FrameStatus.NO_WIRE, note=OFF_THE_LUMEN)
+        return Curve(np.zeros((0, 3)), np.zeros(0)).doubted(FrameStatus.NO_WIRE, OFF_THE_LUMEN)
     with subtracting(frame, lumen, reference) as image:
         entry = replace(stated, point=image.local(stated.point[None])[0], direction=image.turned(stated.direction))
         curve = BACK_END(image, entry, previous, config)
@@ -134,24 +133,21 @@ def of_catheter(curve: Curve, catheter_mm: float) -> Curve:
     """
     dim = curve.levels.get(DIM_FROM_TIP, np.inf)
     if abs(curve.length_mm - dim - catheter_mm) < CATHETER_END_MM:
-        curve = cleared(curve)
-    open_question = curve.status is FrameStatus.OK or np.isfinite(dim)
-    if not open_question or not abs(curve.length_mm - catheter_mm) < CATHETER_END_MM:
+        curve = curve.without(DIM_FROM_TIP)
+    if curve.refused or not abs(curve.length_mm - catheter_mm) < CATHETER_END_MM:
         return curve
-    # other depths clear nothing
-    levels = {name: level for name, level in curve.levels.items() if name not in (DIM_FROM_TIP, BEYOND_GAP)}
     note = f"trace: length: got {curve.length_mm:.2f} mm, where the catheter ends ({catheter_mm:.2f} mm); "
     note += "expected a wire that ends elsewhere, or a stated depth; give insertion_mm"
-    return replace(curve, status=FrameStatus.TRACE_AMBIGUOUS, note=note, levels=levels)
+    return curve.doubted(FrameStatus.TRACE_AMBIGUOUS, note)
 
 
 def of_length(curve: Curve, expected_mm: float | None, config: TraceConfig) -> Curve:
-    """The curve, traced or given; an OK one whose length is too far from the expected one gets LENGTH_MISMATCH."""
-    if curve.status is not FrameStatus.OK or missed_mm(curve.length_mm, expected_mm, config) == 0:
+    """The curve, traced or given; one whose length is too far from the expected one gets LENGTH_MISMATCH."""
+    if curve.refused or missed_mm(curve.length_mm, expected_mm, config) == 0:
         return curve
     note = f"trace: length: got {curve.length_mm:.2f} mm; expected {expected_mm:.2f} mm (insertion_mm) to within "
     note += f"{config.length_tolerance_mm} mm; look at the picture, then correct the manifest or "
     note += "trace.length_tolerance_mm"
     if expected_mm and (unit := unit_of(curve.length_mm / expected_mm, UNIT_ROOM)):
         note += f"; it would do in {unit}: give mm"
-    return replace(curve, status=FrameStatus.LENGTH_MISMATCH, note=note)
+    return curve.doubted(FrameStatus.LENGTH_MISMATCH, note)

@@ -64,21 +64,18 @@ def no_wire(image: Subtraction) -> Curve:
         )
         if not image.without_reference:
             do = f"check that the reference is of this phantom, in this place and of this contrast; {do}"
-    return Curve(
-        np.zeros((0, 3)), np.zeros(0), status=status, note=note_of(got, allowed, do),
-        counters=image.counters, levels=image.levels,
-    )  # fmt: skip
+    empty = Curve(np.zeros((0, 3)), np.zeros(0), counters=image.counters, levels=image.levels)
+    return empty.doubted(status, note_of(got, allowed, do))
 
 
 def faint_for_its_noise(curve: Curve) -> Curve:
     """The curve, or the same as too low in contrast where correlated noise hides the wire more than white noise."""
     seen = curve.levels["cnr"] / max(1.0, curve.levels["inflation"])
-    if seen > LEAST_SEEN or curve.status is not FrameStatus.OK or curve.counters["from_previous"]:
+    if seen > LEAST_SEEN or curve.refused or curve.counters["from_previous"]:
         return curve
     got = f"a line {seen:.1f} noises bright, noise counted as it is correlated"
     do = "check that the frame shows a wire; scan with more dose or a smoother reconstruction kernel"
-    note = note_of(got, f"{LEAST_SEEN} at least", do)
-    return replace(curve, status=FrameStatus.TRACE_LOW_CONTRAST, note=note)
+    return curve.doubted(FrameStatus.TRACE_LOW_CONTRAST, note_of(got, f"{LEAST_SEEN} at least", do))
 
 
 def ends_in_nothing(image: Subtraction, attempt: Attempt, curve: Curve) -> Curve:
@@ -88,7 +85,7 @@ def ends_in_nothing(image: Subtraction, attempt: Attempt, curve: Curve) -> Curve
     stairs of a label map, is a line of 10 standard deviations, too.  With FAINT_BEYOND among its levels where that is
     sure, but no brighter than streaks of the wire are.
     """
-    if curve.status is not FrameStatus.OK:
+    if curve.refused:
         return curve
     tube = attempt.tube
     left = tube.sigma**2 / (tube.sigma**2 + (CREST_VOXELS * image.voxel) ** 2)
@@ -100,7 +97,7 @@ def ends_in_nothing(image: Subtraction, attempt: Attempt, curve: Curve) -> Curve
         if attempt.missing_mm > 0.0:
             got += f", where {attempt.missing_mm:.1f} mm of the stated depth are missing"
         do = "look whether the wire's end is fainter than the rest; scan with more dose"
-        return replace(curve, status=FrameStatus.TRACE_AMBIGUOUS, note=note_of(got, allowed, do))
+        return curve.doubted(FrameStatus.TRACE_AMBIGUOUS, note_of(got, allowed, do))
     if highest(ways, faint) > STREAK_SURE:
         share = float(ways[np.argmax(ways[:, 1]), 0]) / (tube.peak * left)
         return replace(curve, levels={**curve.levels, FAINT_BEYOND: share})
@@ -122,22 +119,21 @@ def not_washed_out(image: Subtraction, tube: Tube, curve: Curve) -> Curve:
 
     image : before its background is levelled.
     """
-    if curve.status is not FrameStatus.OK:
+    if curve.refused:
         return curve
     darker = washed_out(image, dense(tube, 0.5 * image.voxel), tube.sigma)
     if darker == 0.0:
         return curve
     got = f"contrast medium about the curve's end that is darker than the reference's by {darker:.2f} of the wire"
     do = "look whether the wire goes on in thin contrast medium; fill the vessel evenly and scan again"
-    note = note_of(got, f"{WASHED:g} at most", do)
-    return replace(curve, status=FrameStatus.TRACE_AMBIGUOUS, note=note)
+    return curve.doubted(FrameStatus.TRACE_AMBIGUOUS, note_of(got, f"{WASHED:g} at most", do))
 
 
 def doubted(image: Subtraction, attempt: Attempt, curve: Curve) -> Curve:
-    """The curve of an attempt with the first of all doubts, if there is any, as its status."""
+    """The curve of an attempt with its doubts: no more once it is refused, all that other frames may settle."""
     curve = with_marks(image, attempt.tube, curve)  # for the other frames, whatever becomes of this one
     curve = ends_in_nothing(image, attempt, faint_for_its_noise(curve))
-    if curve.status is not FrameStatus.OK or attempt.depth_stated:  # a stated depth says where the wire ends
+    if curve.refused or attempt.depth_stated:  # a stated depth says where the wire ends
         return curve
     read = along_line(image, attempt.tube)
     curve = of_one_device(image, attempt.tube, nothing_beyond(curve))

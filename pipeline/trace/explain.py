@@ -230,11 +230,12 @@ def _curve(image: Subtraction, best: Candidate) -> Curve:
         "inflation": float(np.median(across)), "inflation_tip": float(along[-1]),
     }  # fmt: skip
     inside, outside = image.wall_greys
-    return Curve(
-        image.world(best.points), sigma, tip_sigma, verdict.flagged, verdict.status,
-        verdict.note, counters, levels=levels, elsewhere_mm=image.world(attempt.elsewhere),
+    curve = Curve(
+        image.world(best.points), sigma, tip_sigma, verdict.flagged,
+        counters=counters, levels=levels, elsewhere_mm=image.world(attempt.elsewhere),
         brightness=tube.brightness(shares_of(tube, best.points)), contrast=inside - outside,
     )  # fmt: skip
+    return curve if verdict.status is FrameStatus.OK else curve.doubted(verdict.status, verdict.note)
 
 
 def _agreed(first: Candidate, second: Candidate, *, modelled: bool) -> Candidate:

@@ -11,6 +11,7 @@ import numpy as np
 
 from pipeline.arrays.polyline import resample
 from pipeline.model import Curve, Volume
+from reports.case_files import frames_named
 
 CUT_OFF, TOGETHER = 0.25, 5
 """Share of a wire with so many voxels of the scan's greatest grey around it (of 27) from which on it is cut off. Noise
@@ -41,9 +42,8 @@ def cut_off(curves: Mapping[int, Curve]) -> list[str]:
     found = {n: curve.levels[LEVEL] for n, curve in curves.items() if LEVEL in curve.levels}
     if not found:
         return []
-    named = f"frame{'s' * (len(found) > 1)} {', '.join(map(str, found))}"
     return [
-        f"{named}: up to {100 * max(found.values()):.0f} % of the wire have the greatest grey of the scan: what is "
-        "brighter is cut off, and the tip may seem up to 1.7 voxels too deep (its standard deviation is a voxel more); "
-        "export the scans with a wider window, or more bits"
+        f"{frames_named([*found])}: up to {100 * max(found.values()):.0f} % of the wire have the greatest grey of the "
+        "scan: what is brighter is cut off, and the tip may seem up to 1.7 voxels too deep (its standard deviation is "
+        "a voxel more); export the scans with a wider window, or more bits"
     ]

@@ -31,7 +31,7 @@ MARK_OFF = 4.0
 BODY_MM = 3.0
 """Length from which a piece is the wire's body, and no marker band."""
 DIM_FROM_TIP = "dim_from_tip_mm"
-"""Level of a curve that is doubted for a dim part alone: how far from its end that part begins."""
+"""Level of a curve that is doubted for a dim part: how far from its end that part begins."""
 BEYOND_GAP = "beyond_gap_mm"
 """Level of a curve with a gap in it: how much of it lies beyond."""
 GAP = "gap_mm"
@@ -90,8 +90,7 @@ def nothing_beyond(curve: Curve) -> Curve:
     away_mm = float(np.linalg.norm(curve.marks_mm - curve.points_mm[-1], axis=1).min())
     got = f"something as bright as the wire in the lumen {away_mm:.1f} mm beyond its tip"
     do = "look whether that is a marker at the wire's end, or another device; state insertion_mm"
-    note = note_of(got, "a tip with nothing beyond it", do)
-    return replace(curve, status=FrameStatus.TRACE_AMBIGUOUS, note=note)
+    return curve.doubted(FrameStatus.TRACE_AMBIGUOUS, note_of(got, "a tip with nothing beyond it", do))
 
 
 def dim_from_tip_mm(steps: Steps, length_mm: float, voxel: float) -> float:
@@ -120,14 +119,13 @@ def of_one_device(image: Subtraction, tube: Tube, curve: Curve) -> Curve:
     Frames at other depths tell: a wire's own dim end stays as long, what a catheter shows beyond the wire does not.
     """
     from_tip = dim_from_tip_mm(tube.steps, tube.length_mm, image.voxel)
-    if not from_tip or curve.status is not FrameStatus.OK:
+    if not from_tip or curve.refused:
         return curve
     got = f"a line whose last {from_tip:.1f} mm are far dimmer than what is before"
     do = "state the wire's opacity if its end is so, insertion_mm, or the catheter and its insertion_mm"
     note = note_of(got, "one brightness, or frames at other depths that show the same end", do)
-    return replace(
-        curve, status=FrameStatus.TRACE_AMBIGUOUS, note=note, levels={**curve.levels, DIM_FROM_TIP: from_tip}
-    )
+    curve = replace(curve, levels={**curve.levels, DIM_FROM_TIP: from_tip})
+    return curve.doubted(FrameStatus.TRACE_AMBIGUOUS, note, of=DIM_FROM_TIP)
 
 
 def along_line(image: Subtraction, tube: Tube) -> tuple[Array, Array]:
@@ -157,15 +155,14 @@ def of_full_height(image: Subtraction, tube: Tube, curve: Curve, read: tuple[Arr
     ``along_line``.
     """
     share, sigmas = _fade(image, tube, *read)
-    if curve.status is not FrameStatus.OK or not (share > FADES and sigmas > FADES_SIGMAS):
+    if curve.refused or not (share > FADES and sigmas > FADES_SIGMAS):
         return curve
     got = f"a line that fades by {100 * share:.0f} % in its last {FADE_MM:g} mm"
     do = "look where the wire ends; state its opacity if its end is so, or insertion_mm"
-    return replace(
-        curve, status=FrameStatus.TRACE_AMBIGUOUS, tip_sigma_mm=float(np.hypot(curve.tip_sigma_mm, FADE_SIGMA_MM)),
-        note=note_of(got, f"{100 * FADES:.0f} % at most, or frames at other depths that show the same end", do),
-        levels={**curve.levels, DIM_FROM_TIP: FADE_MM},
-    )  # fmt: skip
+    note = note_of(got, f"{100 * FADES:.0f} % at most, or frames at other depths that show the same end", do)
+    tip_sigma_mm = float(np.hypot(curve.tip_sigma_mm, FADE_SIGMA_MM))
+    curve = replace(curve, tip_sigma_mm=tip_sigma_mm, levels={**curve.levels, DIM_FROM_TIP: FADE_MM})
+    return curve.doubted(FrameStatus.TRACE_AMBIGUOUS, note, of=DIM_FROM_TIP)
 
 
 def first_gap_mm(grey: Array, arc: Array, noise: float) -> tuple[float, float]:
@@ -192,7 +189,7 @@ def of_one_line(image: Subtraction, curve: Curve, read: tuple[Array, Array]) -> 
     arc, grey = read
     begins_mm, ends_mm = first_gap_mm(grey, arc, image.noise_in(CREST_VOXELS))
     beyond_mm = float(arc[-1]) - ends_mm
-    if np.isinf(ends_mm) or curve.status is not FrameStatus.OK:
+    if np.isinf(ends_mm) or curve.refused:
         return curve
     curve = replace(curve, levels={**curve.levels, BEYOND_GAP: beyond_mm, GAP: ends_mm - begins_mm})
     # in a modelled background a stenosis looks like a gap; so near to the tip there is hardly one
@@ -201,9 +198,4 @@ def of_one_line(image: Subtraction, curve: Curve, read: tuple[Array, Array]) -> 
     got = f"a line with {beyond_mm:.1f} mm of it beyond a gap"
     allowed = f"{LEAST_BEYOND_MM:g} to {MOST_BEYOND_MM:g} mm, or frames at other depths that show the same gap"
     do = "look whether a second device faces the wire's tip there, or a marker is a catheter's; state insertion_mm"
-    return replace(curve, status=FrameStatus.TRACE_AMBIGUOUS, note=note_of(got, allowed, do))
-
-
-def cleared(curve: Curve, of: str = DIM_FROM_TIP) -> Curve:
-    """A curve that was doubted for its dim part, or its gap, alone, without that doubt; any other as it is."""
-    return replace(curve, status=FrameStatus.OK, note="") if of in curve.levels else curve
+    return curve.doubted(FrameStatus.TRACE_AMBIGUOUS, note_of(got, allowed, do), of=BEYOND_GAP)

@@ -33,7 +33,7 @@ from pipeline.budget.surface import offset_field
 from pipeline.budget.verdict import ROUND, axes_across, judged, reach_mm
 from pipeline.cli import main
 from pipeline.model import Array, Clamp, Curve, Lumen, Wall, Wire
-from pipeline.run.stages.budget import Work, _row
+from pipeline.run.stages.budget import Work, _lost, _row
 from pipeline.run.stages.known import Frame
 from pipeline.simulate.config import SimulateConfig, SolverConfig
 from pipeline.simulate.evidence import TraceSamples
@@ -519,3 +519,9 @@ def test_a_manifest_states_what_it_knows(tmp_path: Path) -> None:
         read_manifest(path)
     assert "uncertainty tapper: unknown key; did you mean 'taper'" in str(error.value)
     assert "uncertainty lumen_mm" in str(error.value)
+
+
+def test_frames_without_a_budget_are_named_as_one_or_as_several() -> None:
+    """It was said of frames 4."""
+    assert _lost({3: None}, 40)[0].startswith("frame 3: fewer than ")
+    assert _lost({3: None, 5: None}, 40)[0].startswith("frames 3, 5: fewer than ")

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.model import Curve
+from pipeline.model import Curve, Lumen
 from pipeline.run.log import Log
 from pipeline.run.stages.depths import (
     drawn_back,
@@ -23,23 +23,19 @@ from pipeline.run.stages.depths import (
     turned_round,
 )
 from pipeline.run.stages.dim_ends import barely_seen, faint_ends, own_dim_ends
+from pipeline.run.stages.gaps import own_gaps
 from pipeline.run.stages.known import Frame
-from pipeline.run.stages.repeated import once
+from pipeline.run.stages.repeated import kept, once
+from pipeline.run.stages.thickness import not_too_thick
 from pipeline.run.stages.trace import _last_curve, _Part
 from pipeline.run.stages.way import with_depths
 from pipeline.simulate.clamp import Clamp
 from pipeline.status import FrameStatus
-from pipeline.trace import DIM_FROM_TIP, FAINT_BEYOND, GOES_ON, of_catheter, of_length
+from pipeline.trace import FAINT_BEYOND, GOES_ON, of_catheter, of_length
 from pipeline.trace.config import TraceConfig
 from reports.doubts import Doubt
-
-
-def frames(lengths: list[float], expected: list[float]) -> list[Frame]:
-    curves = [
-        Curve(np.stack([np.zeros(9), np.zeros(9), np.linspace(0, n, 9)], 1), np.full(9, 0.02), 0.05) for n in lengths
-    ]
-    return [Frame(i, expected_mm=e, curve=c) for i, (e, c) in enumerate(zip(expected, curves, strict=True))]
-
+from solver.grid import Grid
+from tests.pipeline.doubts import dim, frames, with_gap
 
 DEPTHS = [10.0, 14.0, 18.0, 22.0, 26.0, 30.0]
 
@@ -183,18 +179,8 @@ def test_frames_that_are_exchanged_by_less_than_any_tolerance_are_a_warning() ->
     assert drawn_back(frames([20.0, 10.0], [20.0, 10.0]), 0.5) == [], "pulled back as stated"
     many = [20.0 + 0.8 * i for i in range(36)]
     (one,) = drawn_back(frames([*many[:14], many[15], many[14], *many[16:]], many), 0.3)
-    assert one.startswith("frames 15 (-0.80 mm, stated +0.80 mm): "), "one pair of thirty-six, 9 standard deviations"
+    assert one.startswith("frame 15 (-0.80 mm, stated +0.80 mm): "), "one pair of thirty-six, 9 standard deviations"
     assert drawn_back(frames([20.0, 10.0], [float("nan")] * 2), 0.5) == []
-
-
-def dim(lengths: list[float], from_tip: list[float]) -> list[Frame]:
-    """Frames whose dim ends may be a catheter's."""
-    out = []
-    for frame, end in zip(frames(lengths, [float("nan")] * len(lengths)), from_tip, strict=True):
-        assert frame.curve is not None
-        curve = replace(frame.curve, status=FrameStatus.TRACE_AMBIGUOUS, note="?", levels={DIM_FROM_TIP: end})
-        out.append(replace(frame, curve=curve).failed("trace", curve.status, curve.note))
-    return out
 
 
 def test_a_dim_end_that_goes_with_the_tip_is_the_wires_own() -> None:
@@ -244,7 +230,7 @@ def test_a_faint_end_that_some_frames_show_is_doubted_in_the_others() -> None:
     note = f"trace: end: got a line {GOES_ON}"
 
     def refused(of: list[Frame], count: int) -> list[Frame]:
-        doubted = [replace(f.curve, status=FrameStatus.TRACE_AMBIGUOUS, note=note) for f in of[:count] if f.curve]
+        doubted = [f.curve.doubted(FrameStatus.TRACE_AMBIGUOUS, note) for f in of[:count] if f.curve]
         return [f.traced_by(curve) for f, curve in zip(of, doubted, strict=False)] + of[count:]
 
     (said,) = faint_ends(refused(unstated, 3))
@@ -272,11 +258,45 @@ def test_a_copy_of_a_frame_is_no_third_that_agrees() -> None:
     assert not any(f.ok for f in own_dim_ends(seen, 0.3)[0])
 
 
+LENGTHS = [20.0, 26.0, 32.0, 38.0]
+
+
+def test_a_rod_with_a_dim_end_of_its_own_is_a_rod() -> None:
+    """A rod of 1.1 mm, of 0.36 mm stated, was ok in 4 of 4 frames: its dim end was asked about alone."""
+    vessel = Lumen(Grid(np.zeros((4, 4, 4)), np.full(3, 0.3)), levels={"scanner_blur_mm": 0.25})
+
+    def thick(curve: Curve) -> Curve:
+        return not_too_thick(replace(curve, levels={**curve.levels, "blur_mm": 0.6}), vessel, 0.18)
+
+    found, said = own_dim_ends(dim(LENGTHS, [6.0] * 4, thick), 0.3)
+    assert not said
+    assert not any(f.ok for f in found)
+    assert "mm thick; expected" in found[0].message, "and no word of other depths, which settle nothing here"
+
+
+def test_a_dim_end_beyond_a_gap_is_asked_about_both() -> None:
+    """Once the dim end was found the wire's own nobody asked whether a second device faced its tip."""
+    seen = dim(LENGTHS, [6.0] * 4, lambda curve: with_gap(curve, 15.5))
+    found, said = own_dim_ends(seen, 0.3)
+    assert "the last 6.0 mm" in said[0]
+    assert [f.status for f in found] == ["trace_ambiguous"] * 4
+    assert all("15.5 mm of it beyond a gap" in f.message for f in found)
+    assert all(f.ok for f in own_gaps(found, 0.3)[0]), "which the frames agree on, too"
+
+
+def test_a_scan_that_was_calibrated_with_is_known_by_its_trace_whatever_its_end() -> None:
+    """Written again and doubted for its dim end, it was scored once other frames had cleared that."""
+    seen = dim(LENGTHS, [6.0] * 4)
+    assert seen[1].curve is not None
+    single = once(seen, traced_mm=[kept(seen[1].curve)])
+    assert [f.status for f in own_dim_ends(single, 0.3)[0]] == ["ok", "repeated", "ok", "ok"]
+
+
 def test_a_frame_is_told_strands_apart_by_one_that_stands_alone() -> None:
     """A longer device beside the wire: refused in frame 0, and ok in frame 1 for frame 0 had a curve like that."""
     right, wrong, own_end = frames([10.0], [10.0])[0], frames([14.0], [14.0])[0], dim([18.0], [8.0])[0]
     assert wrong.curve is not None
-    wrong = replace(wrong, curve=replace(wrong.curve, status=FrameStatus.TRACE_AMBIGUOUS))
+    wrong = replace(wrong, curve=wrong.curve.doubted(FrameStatus.TRACE_AMBIGUOUS, ""))
     lengths = [
         round(_last_curve(len(seen), [_Part(f, None, Log(lambda *_: None)) for f in seen].__getitem__).length_mm)
         for seen in ([wrong], [right, wrong], [right, wrong, own_end])

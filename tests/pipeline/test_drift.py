@@ -23,7 +23,8 @@ def moved(scan: Volume, voxels: float) -> Volume:
 
 
 def seen(status: FrameStatus) -> Curve:
-    return Curve(np.eye(3), np.full(3, 0.02), status=status, note="" if status is FrameStatus.OK else FAINT)
+    curve = Curve(np.eye(3), np.full(3, 0.02))
+    return curve if status is FrameStatus.OK else curve.doubted(status, FAINT)
 
 
 @pytest.fixture(scope="module")

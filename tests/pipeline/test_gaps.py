@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from pipeline.model import Curve, Lumen
 from pipeline.run.stages.gaps import own_gaps
 from pipeline.run.stages.known import Frame
+from pipeline.run.stages.repeated import once
+from pipeline.run.stages.thickness import not_too_thick
 from pipeline.segment import segment
 from pipeline.status import FrameStatus
-from pipeline.trace import BEYOND_GAP, GAP, trace
+from pipeline.trace import BEYOND_GAP, GAP, of_catheter, trace
 from pipeline.trace.whose_end import first_gap_mm
+from solver.grid import Grid
 from tests.later import later
-from tests.pipeline.test_depths import frames
+from tests.pipeline.doubts import frames, with_gap
 from tests.studies.seeing.render import arc_of
 from tests.studies.seeing.scenes import Draft
 
@@ -56,21 +61,18 @@ def test_a_gap_is_darker_than_the_line_on_both_sides():
     assert first_gap_mm(noisy, arc, 0.15) == none
 
 
-def gapped(lengths: list[float], beyond: list[float], *, doubted: bool) -> list[Frame]:
-    """Frames whose wires have gaps, refused for them or not."""
-    out = []
-    for frame, far in zip(frames(lengths, [NAN] * len(lengths)), beyond, strict=True):
-        assert frame.curve is not None
-        status = FrameStatus.TRACE_AMBIGUOUS if doubted else FrameStatus.OK
-        curve = replace(frame.curve, status=status, levels={BEYOND_GAP: far, GAP: 3.0} if far else {})
-        done = replace(frame, curve=curve)
-        out.append(done.failed("trace", status, "?") if doubted else done)
-    return out
+def gapped(lengths: list[float], beyond: list[float], then: Callable[[Curve], Curve] = lambda c: c) -> list[Frame]:
+    """Frames whose wires have gaps, as tracing judges them, and what is asked of their curves then."""
+    return [
+        frame.traced_by(then(with_gap(frame.curve, far) if far else frame.curve))
+        for frame, far in zip(frames(lengths, [NAN] * len(lengths)), beyond, strict=True)
+        if frame.curve is not None
+    ]
 
 
 @pytest.mark.parametrize("beyond", [[20.0, 20.3, 19.8], [20.0, 25.2, 30.0]], ids=["the wire's", "a streak's"])
 def test_a_gap_at_the_same_distance_from_tip_or_entry_is_no_second_device(beyond):
-    found, said = own_gaps(gapped([40.0, 45.0, 50.0], beyond, doubted=True), 0.3)
+    found, said = own_gaps(gapped([40.0, 45.0, 50.0], beyond), 0.3)
     assert [f.status for f in found] == ["ok"] * 3
     assert all(f.trusted_curve is not None and f.trusted_curve.status is FrameStatus.OK for f in found)
     assert not said
@@ -85,13 +87,34 @@ def test_a_gap_at_the_same_distance_from_tip_or_entry_is_no_second_device(beyond
     ],
 )
 def test_a_gap_that_may_be_before_another_device_stays_refused(lengths, beyond):
-    found, _ = own_gaps(gapped(lengths, beyond, doubted=True), 0.3)
+    found, _ = own_gaps(gapped(lengths, beyond), 0.3)
     assert not any(f.ok for f in found)
+
+
+def test_a_copy_of_a_frame_is_no_third_with_the_same_gap():
+    seen = gapped([40.0, 46.0, 40.0], [20.0] * 3)
+    found = once([replace(f, voxels=v) for f, v in zip(seen, "aba", strict=True)])
+    assert [f.status for f in own_gaps(found, 0.3)[0]] == ["trace_ambiguous", "trace_ambiguous", "repeated"]
+
+
+@pytest.mark.parametrize("beyond", [8.0, 20.0], ids=["a gap that is ok", "a gap that is doubted"])
+def test_frames_with_one_gap_are_refused_for_what_else_is_wrong_with_them(beyond: float):
+    """A rod five times as thick as the stated wire was ok, for all frames showed the same gap in it."""
+    vessel = Lumen(Grid(np.zeros((4, 4, 4)), np.full(3, 0.3)), levels={"scanner_blur_mm": 0.25})
+
+    def thick(curve: Curve) -> Curve:
+        return not_too_thick(replace(curve, levels={**curve.levels, "blur_mm": 0.9}), vessel, 0.18)
+
+    lengths = [30.0, 36.0, 42.0, 48.0]
+    assert not any(f.ok for f in own_gaps(gapped(lengths, [beyond] * 4, thick), 0.3)[0])
+    # with the catheter's end where the line ends, other depths tell nothing of it either
+    ends = gapped(lengths, [beyond] * 4, lambda curve: of_catheter(curve, curve.length_mm))
+    assert not any(f.ok for f in own_gaps(ends, 0.3)[0])
 
 
 def test_what_lay_ahead_of_the_tip_in_another_frame_is_no_wire():
     """A device of 10 mm: bright line off the curve in frame 0, the wire's last 10 mm in frame 1, which was ok."""
-    seen = gapped([15.0, 46.0], [0.0, 10.0], doubted=False)
+    seen = gapped([15.0, 46.0], [0.0, 10.0])
     ahead = np.stack([np.zeros(20), np.zeros(20), np.linspace(36.5, 46.0, 20)], 1)
     first = seen[0].curve
     assert first is not None
@@ -110,9 +133,9 @@ def test_what_lay_ahead_of_the_tip_in_another_frame_is_no_wire():
 
 
 def test_a_gap_that_nothing_explains_is_a_warning_and_a_stated_depth_ends_all_doubt():
-    found, said = own_gaps(gapped([40.0], [10.0], doubted=False), 0.3)
+    found, said = own_gaps(gapped([40.0], [10.0]), 0.3)
     assert found[0].ok
-    assert "frames 0 (10.0 mm)" in said[0]
+    assert said[0].startswith("frame 0 (10.0 mm): so much")
     assert "state insertion_mm" in said[0]
     stated = [replace(f, expected_mm=40.0) for f in found]
     assert own_gaps(stated, 0.3) == (stated, [])
@@ -127,7 +150,7 @@ def test_frames_that_end_at_one_point_while_their_gaps_grow_are_counted():
         seen[n] = replace(seen[n], curve=replace(curve, levels={BEYOND_GAP: 4.0, GAP: gap_mm}))
     _, (said,) = own_gaps(seen, 0.35)
     assert "4 frames (1, 2, 3, 4) end at the same point, though the gap in them is 1.5 mm long in one and 5.3" in said
-    other = gapped([40.0, 44.0, 48.0], [10.0, 16.0, 3.0], doubted=False)
+    other = gapped([40.0, 44.0, 48.0], [10.0, 14.0, 3.0])
     assert "end at the same point" not in own_gaps(other, 0.35)[1][0]
 
 

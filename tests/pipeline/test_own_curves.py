@@ -245,7 +245,7 @@ def test_a_curve_that_is_not_where_the_scan_shows_the_wire_opens_no_lumen() -> N
     wire = np.stack([np.zeros(40), np.zeros(40), np.linspace(0.0, 20.0, 40)], axis=1)
     own, sigma = wire + np.linspace(0.0, 2.0, 40)[:, None] * [1.0, 0.0, 0.0], np.full(40, 0.03)
     frames = [Frame(0, curve=Curve(wire, sigma)), Frame(1, curve=Curve(own, sigma)), Frame(2, curve=Curve(own, sigma))]
-    seen = [Curve(wire, sigma), Curve(wire, sigma), Curve(wire, sigma, status=FrameStatus.TRACE_AMBIGUOUS)]
+    seen = [Curve(wire, sigma), Curve(wire, sigma), Curve(wire, sigma).doubted(FrameStatus.TRACE_AMBIGUOUS, "")]
     assert set(beside_what_is_seen(frames, seen, TraceConfig(), 0.35)[1]) == {1}
     assert not beside_what_is_seen(frames, [None, None, None], TraceConfig(), 0.35)[1]
 

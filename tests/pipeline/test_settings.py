@@ -126,13 +126,15 @@ def test_a_lumen_and_a_curve_come_back_as_they_were(tmp_path: Path) -> None:
     np.testing.assert_array_equal(back.distance.values, grid.values)
     assert (back.wall_level, back.warnings, dict(back.counters)) == (550.0, ("thin",), {"visited": 7})
     assert digest(back) == digest(lumen)
-    curve = Curve(np.eye(3), np.ones(3), 0.1, np.array([True, False, True]), FrameStatus.LENGTH_MISMATCH, "why")
+    curve = Curve(np.eye(3), np.ones(3), 0.1, np.array([True, False, True]))
+    curve = curve.doubted(FrameStatus.TRACE_FAILED, "why not", of="gap").doubted(FrameStatus.LENGTH_MISMATCH, "why")
     store.put("trace", "cd" * 32, curve)
     again = store.get("trace", "cd" * 32)
     assert isinstance(again, Curve)
     np.testing.assert_array_equal(again.points_mm, curve.points_mm)
     np.testing.assert_array_equal(again.flagged, curve.flagged)
     assert (again.status, again.note) == (FrameStatus.LENGTH_MISMATCH, "why")
+    assert again.doubts == curve.doubts
     assert digest(again) == digest(curve)
 
 

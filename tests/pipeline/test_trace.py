@@ -244,13 +244,13 @@ def test_a_faint_line_beyond_a_tip_of_the_stated_depth_refuses_nothing(monkeypat
     assert not longer.attempt.agrees, "it lacks more than three voxels"
     monkeypatch.setattr(doubts, "_beyond", lambda image, tube, *_: np.array([[0.1 * tube.peak, SURE + 1.0]]))
     curve = trace(*scans(16)[::2], *vessel()[4:], reference=scans(16)[1])
-    found = doubts.ends_in_nothing(image, best.attempt, replace(curve, status=FrameStatus.OK))
+    found = doubts.ends_in_nothing(image, best.attempt, replace(curve, doubts=()))
     assert found.status is FrameStatus.TRACE_AMBIGUOUS
     place = [float(x) for x in re.search(r"followed, from (\S+), (\S+), (\S+) mm on", found.note).groups()]
     assert np.linalg.norm(place - curve.points_mm[-1]) < 0.1
-    kept = doubts.ends_in_nothing(image, stated.attempt, replace(curve, status=FrameStatus.OK))
+    kept = doubts.ends_in_nothing(image, stated.attempt, replace(curve, doubts=()))
     assert kept.status is FrameStatus.OK
-    lacking = doubts.ends_in_nothing(image, longer.attempt, replace(curve, status=FrameStatus.OK))
+    lacking = doubts.ends_in_nothing(image, longer.attempt, replace(curve, doubts=()))
     assert "mm on, where 1.0 mm of the stated depth are missing; expected" in lacking.note
 
 
@@ -413,7 +413,7 @@ def test_another_wire_in_the_lumen_is_not_passed_over_in_silence():
 def test_empty_previous_curve_and_config_are_accepted():
     frame, reference, lumen = scans(8)
     _, _, _, _, entry, direction = vessel()
-    nothing = Curve(np.zeros((0, 3)), np.zeros(0), status=FrameStatus.NO_WIRE)
+    nothing = Curve(np.zeros((0, 3)), np.zeros(0)).doubted(FrameStatus.NO_WIRE, "")
     curve = trace(frame, lumen, entry, direction, reference=reference, previous=nothing, expected_mm=5.0,
                   config=TraceConfig(ridge_voxels=0.8))  # fmt: skip
     assert curve.length_mm > 20
@@ -470,7 +470,7 @@ def test_a_trace_that_ends_with_the_catheter_may_be_the_catheter_s():
     assert "38.40" in found.note
     assert "insertion_mm" in found.note
     assert of_catheter(curve, 30.0) is curve
-    missing = replace(curve, status=FrameStatus.NO_WIRE)
+    missing = curve.doubted(FrameStatus.NO_WIRE, "")
     assert of_catheter(missing, 38.4) is missing
 
 

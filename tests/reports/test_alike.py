@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from reports.alike import alike, in_words, of_what
+from reports.case_files import frames_named
 
 
 def row(frame: int | None, message: str, case: str = "a", status: str = "no_wire") -> dict[str, object]:
@@ -51,3 +52,9 @@ def test_all_files_that_cannot_be_read_are_named() -> None:
     (same,) = alike([row(n, f"depth_{n}/recon.mha: cut short") for n in (0, 1)])
     assert same["files"] == "depth_0/recon.mha, depth_1/recon.mha", "one name of several files tells nothing"
     assert alike([row(n, f"trace: brightest ridge at CNR {n}.3") for n in (0, 1)])[0]["files"] == ""
+
+
+def test_frames_are_named_as_one_or_as_several() -> None:
+    assert frames_named([4]) == "frame 4"
+    assert frames_named(["4 (-0.50 mm)", 7]) == "frames 4 (-0.50 mm), 7"
+    assert frames_named(range(14)) == "frames 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11 and 2 more"

@@ -9,13 +9,13 @@ from pipeline.model import Curve
 
 NOTHING = Curve(np.zeros((0, 3)), np.zeros(0))
 """An empty curve: stands for the previous one where there is none."""
-ASKS = Curve(np.zeros((0, 3)), np.zeros(0), note="depends on the curve of the frame before")
+ASKS = Curve(np.zeros((0, 3)), np.zeros(0), source="depends on the curve of the frame before")
 """Stored under a frame's own inputs where its trace also depends on the frame before."""
 
 
 def is_asks(kept: object) -> bool:
     """Whether a stored result is ``ASKS``."""
-    return isinstance(kept, Curve) and kept.note == ASKS.note and len(kept.points_mm) == 0
+    return isinstance(kept, Curve) and kept.source == ASKS.source and len(kept.points_mm) == 0
 
 
 class Before:

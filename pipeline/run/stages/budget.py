@@ -37,6 +37,7 @@ from pipeline.simulate.clamp import TIP_VOXELS, ahead_of
 from pipeline.simulate.evidence import UNKNOWN_VOXELS, TraceSamples
 from pipeline.simulate.resolution import AGREED_MM, lengths_mm
 from pipeline.simulate.way import Way
+from reports.case_files import frames_named
 
 AT_REST, RARE = 0.9, 0.05
 NOT_OURS = (
@@ -85,11 +86,10 @@ def _lost(found: Mapping[int, Budget | None], count: int) -> list[str]:
     few = [n for n, budget in found.items() if budget is None or budget.members < AT_REST * count]
     if not few:
         return []
-    frames = ", ".join(map(str, few))
     return [
-        f"frames {frames}: fewer than {100 * AT_REST:.0f} % of the {count} insertions of the budget came to rest, or "
-        f"fewer than {FEWEST}, of which nothing is said: u_val is that of the others; raise budget.members, or state "
-        "smaller uncertainties"
+        f"{frames_named(few)}: fewer than {100 * AT_REST:.0f} % of the {count} insertions of the budget came to rest, "
+        f"or fewer than {FEWEST}, of which nothing is said: u_val is that of the others; raise budget.members, or "
+        "state smaller uncertainties"
     ]
 
 

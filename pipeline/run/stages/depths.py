@@ -12,12 +12,12 @@ from numpy.typing import ArrayLike
 from scipy.special import bdtrc, ndtr, stdtrit
 
 from pipeline.arrays.grids import spread
-from pipeline.model import Array, Clamp
+from pipeline.model import Array, Clamp, Doubt
 from pipeline.run.stages.known import Frame
 from pipeline.simulate.clamp import TIP_VOXELS, depth_from
 from pipeline.status import FrameStatus
 from pipeline.trace import hardly_begun
-from reports.case_files import listed
+from reports.case_files import frames_named
 
 AROUND = 5
 """Number of neighbouring frames whose median difference of traced length and stated depth is the usual one."""
@@ -174,8 +174,8 @@ def turned_round(frames: Sequence[Frame]) -> list[Frame]:
         f"trace: wire: got more of it behind the entry than beyond it in {len(back)} of {len(frames)} frames; expected "
         "more beyond it; entry_direction seems to be reversed: it points the way the wire is pushed; turn it round"
     )
-    wrong = FrameStatus.TRACE_WRONG_WAY
-    return [f if f.curve is None else f.cleared(f.curve).failed("trace", wrong, note) for f in frames]
+    why = (Doubt(FrameStatus.TRACE_WRONG_WAY, note),)
+    return [f if f.curve is None else f.cleared(replace(f.curve, doubts=why)) for f in frames]
 
 
 def shrinking(frames: Sequence[Frame], voxel_mm: float) -> list[str]:
@@ -189,7 +189,7 @@ def shrinking(frames: Sequence[Frame], voxel_mm: float) -> list[str]:
     if not odd:
         return []
     return [
-        f"frame{'s' * (len(odd) > 1)} {', '.join(odd)}: the traced wire is shorter than in the frame before, allowed "
+        f"{frames_named(odd)}: the traced wire is shorter than in the frame before, allowed "
         "where it was pulled back; are the frames in order? Else look at the picture whether the trace is cut short, "
         "or state insertion_mm"
     ]
@@ -213,7 +213,7 @@ def drawn_back(frames: Sequence[Frame], voxel_mm: float) -> list[str]:
     if not odd or (most < SURELY and bdtrc(len(odd) - 1, count, ndtr(-APART)) > CHANCE):
         return []
     return [
-        f"frames {listed(odd)}: the traced wire is shorter than in the frame before, where insertion_mm is deeper: are "
+        f"{frames_named(odd)}: the traced wire is shorter than in the frame before, where insertion_mm is deeper: are "
         "frames and insertion_mm in one order? Else look at the pictures whether traces are cut short"
     ]
 

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from pipeline.run.stages.known import Frame, trusted
-from pipeline.trace import DIM_FROM_TIP, FAINT_BEYOND, GOES_ON, cleared
-from reports.case_files import listed
+from pipeline.trace import DIM_FROM_TIP, FAINT_BEYOND, GOES_ON
+from reports.case_files import frames_named, listed
 
 FEWEST = 3
 """Frames that must agree."""
@@ -21,13 +21,15 @@ GO_ON, MOST_OTHERS = 2, 2.0
 def own_dim_ends(frames: Sequence[Frame], voxel_mm: float) -> tuple[list[Frame], list[str]]:
     """The frames, cleared of the doubt about a dim end where they agree on it; and what was assumed.
 
-    A catheter that stays where it is shows less of itself the further the wire is pushed.
+    A catheter that stays where it is shows less of itself the further the wire is pushed. A frame that is refused for
+    something else, or a copy of another, does not agree with any.
     """
     out = list(frames)
-    doubted = [i for i, f in enumerate(out) if f.stage == "trace" and f.curve and DIM_FROM_TIP in f.curve.levels]
-    curves = [curve for i in doubted if (curve := out[i].curve) is not None]
-    if not curves:
+    seen = {n: curve for n, frame in enumerate(frames) if (curve := frame.open_curve) is not None}
+    found = {n: curve for n, curve in seen.items() if any(doubt.of == DIM_FROM_TIP for doubt in curve.doubts)}
+    if not found:
         return out, []
+    doubted, curves = [*found], [*found.values()]
     dim, length = (np.array(v) for v in zip(*((c.levels[DIM_FROM_TIP], c.length_mm) for c in curves), strict=True))
     usual = float(np.median(dim))
     agreed = np.abs(dim - usual) < AGREE_VOXELS * voxel_mm
@@ -35,7 +37,7 @@ def own_dim_ends(frames: Sequence[Frame], voxel_mm: float) -> tuple[list[Frame],
         return out, []
     usual = float(np.median(dim[agreed]))
     for n in np.flatnonzero(agreed):
-        out[doubted[n]] = out[doubted[n]].cleared(cleared(curves[n]))
+        out[doubted[n]] = out[doubted[n]].cleared(curves[n].without(DIM_FROM_TIP))
     said = (
         f"the last {usual:.1f} mm of the wire are dimmer than the rest in {int(agreed.sum())} frames, at depths of "
         f"{length[agreed].min():.1f} to {length[agreed].max():.1f} mm: taken for the wire's own end; were it a "
@@ -51,7 +53,7 @@ def faint_ends(frames: Sequence[Frame]) -> list[str]:
     if len(go_on) < GO_ON or not 0 < len(others) <= MOST_OTHERS * len(go_on):
         return []
     return [
-        f"in frames {listed(go_on)} a line goes on {GOES_ON}: the wire's end may be too faint in {listed(others)}, "
+        f"in {frames_named(go_on)} a line goes on {GOES_ON}: the wire's end may be too faint in {listed(others)}, "
         "too, whose traces then end short of it, with a sigma that does not say so; state insertion_mm (mm) of each "
         "frame, or the wire's opacity"
     ]
@@ -63,9 +65,9 @@ def barely_seen(frames: Sequence[Frame]) -> list[str]:
     shares = {n: c.levels[FAINT_BEYOND] for n, c in trusted(unstated).items() if FAINT_BEYOND in c.levels}
     if not shares:
         return []
-    several = f"frame{'s' * (len(shares) > 1)} {listed([*map(str, shares)])}"
     return [
-        f"beyond the traced tip of {several} something goes on, {max(shares.values()):.2g} times as bright as the wire "
+        f"beyond the traced tip of {frames_named([*shares])} something goes on, "
+        f"{max(shares.values()):.2g} times as bright as the wire "
         "at most: a streak of it, or an end that is so faint, without which the trace is short; look there, and state "
         "insertion_mm (mm) of each frame, or the wire's opacity"
     ]

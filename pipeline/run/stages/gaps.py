@@ -12,8 +12,8 @@ from scipy.spatial import cKDTree
 from pipeline.model import Curve, arc_length
 from pipeline.run.stages.known import Frame, trusted
 from pipeline.status import FrameStatus
-from pipeline.trace import BEYOND_GAP, GAP, cleared
-from reports.case_files import listed
+from pipeline.trace import BEYOND_GAP, GAP
+from reports.case_files import frames_named, listed
 
 FEWEST = 3
 """Frames that must agree on a gap."""
@@ -32,11 +32,13 @@ END_MM = 2.0
 def own_gaps(frames: Sequence[Frame], voxel_mm: float) -> tuple[list[Frame], list[str]]:
     """The frames, cleared of the doubt about a gap where they agree on it; and a warning for each other gap's frame.
 
-    Of gaps, frames with a stated depth are left out: it says where the wire ends.
+    Of gaps, frames with a stated depth are left out: it says where the wire ends. So are frames that are refused for
+    something else, and copies of others: they agree with none.
     """
     out = list(frames)
-    with_gap = [n for n, f in enumerate(out) if np.isnan(f.expected_mm) and f.curve and BEYOND_GAP in f.curve.levels]
-    curves = [curve for n in with_gap if (curve := out[n].curve) is not None]
+    seen = {n: c for n, f in enumerate(out) if np.isnan(f.expected_mm) and (c := f.open_curve) is not None}
+    with_gap = [n for n, curve in seen.items() if BEYOND_GAP in curve.levels]
+    curves = [seen[n] for n in with_gap]
     length = np.array([curve.length_mm for curve in curves])
     beyond = np.array([curve.levels[BEYOND_GAP] for curve in curves])
     agreed = np.zeros(len(curves), bool)
@@ -45,15 +47,13 @@ def own_gaps(frames: Sequence[Frame], voxel_mm: float) -> tuple[list[Frame], lis
         if same.sum() >= FEWEST and np.ptp(length[same]) > MOVED_MM:
             agreed |= same
     for n in np.flatnonzero(agreed):
-        frame = out[with_gap[n]]
-        if frame.stage == "trace" and frame.status == FrameStatus.TRACE_AMBIGUOUS.identifier:
-            out[with_gap[n]] = frame.cleared(cleared(curves[n], BEYOND_GAP))
+        out[with_gap[n]] = out[with_gap[n]].cleared(curves[n].without(BEYOND_GAP))
     out = [_past_marks(frame, frames, voxel_mm) for frame in _faced(out, voxel_mm)]
     odd = [f"{out[with_gap[n]].index} ({beyond[n]:.1f} mm)" for n in np.flatnonzero(~agreed) if out[with_gap[n]].ok]
     if not odd:
         return out, []
     return out, [
-        f"frames {', '.join(odd)}: so much of the traced wire lies beyond a gap in it, and a second device that faces "
+        f"{frames_named(odd)}: so much of the traced wire lies beyond a gap in it, and a second device that faces "
         f"the wire's tip would look the same: look at the picture, or state insertion_mm{_at_one_place(out, voxel_mm)}"
     ]
 

@@ -87,6 +87,12 @@ class Frame:
         return self.curve if self.traced and self.stage not in UP_TO_TRACE else None
 
     @property
+    def open_curve(self) -> Curve | None:
+        """The traced curve of a frame that counts once, and of which other frames may settle all that is doubted."""
+        curve = self.curve if self.traced and self.stage != "load" else None
+        return None if curve is None or curve.refused else curve
+
+    @property
     def solved(self) -> Solution | None:
         """The simulated wire where it is this project's own, with all that the solver knows of it."""
         return self.simulated if isinstance(self.simulated, Solution) else None
@@ -102,9 +108,10 @@ class Frame:
         return self.solved is not None and (self.solved.uncertain or self.num_mm > AGREED_MM)
 
     def cleared(self, curve: Curve) -> "Frame":
-        """The same frame with a curve that is doubted no more."""
+        """The same frame with a curve of which other doubts are left, or none."""
         good = FrameStatus.OK
-        return replace(self, curve=curve, status=good.identifier, sentence=good.value, stage="", message="")
+        fresh = replace(self, status=good.identifier, sentence=good.value, stage="", message="")
+        return fresh.traced_by(curve)
 
     def traced_by(self, curve: Curve) -> "Frame":
         """The same frame with its curve, failed where the curve is not to be trusted."""

@@ -52,10 +52,11 @@ def as_given(run: Context, frame: Frame, curve: Curve, distance: Grid) -> Frame:
     entry, direction = np.array(run.case.entry_mm), np.array(run.case.entry_direction)
     odd = oddity(curve.points_mm, entry, direction, depth_mm=frame.expected_mm)
     if odd:
-        return frame.failed("trace", FrameStatus.TRACE_FAILED, f"{curve.note}: {odd}")
+        return frame.failed("trace", FrameStatus.TRACE_FAILED, f"{curve.source}: {odd}")
     points = begun(curve.points_mm, entry, direction)
     expected = None if np.isnan(frame.expected_mm) else frame.expected_mm
-    curve = of_length(Curve(points, np.full(len(points), np.nan), note=curve.note), expected, run.config.trace)
+    begun_there = Curve(points, np.full(len(points), np.nan), source=curve.source)
+    curve = of_length(begun_there, expected, run.config.trace)
     frame = replace(frame, voxels=frame.voxels or known_by_tip(points))
     return frame.traced_by(_in_lumen(_smooth(curve), distance, run.case.wall.stiffness_N_mm2))
 
@@ -73,14 +74,14 @@ def known_by_tip(points_mm: Array) -> str:
 def _smooth(curve: Curve) -> Curve:
     """The curve; one that zigzags has failed: its length, which is the frame's depth, is not the wire's."""
     share = zigzag(curve.points_mm)
-    if curve.status is not FrameStatus.OK or share <= LONGER:
+    if curve.refused or share <= LONGER:
         return curve
     note = (
-        f"{curve.note}: {curve.length_mm:.2f} mm long, {100 * share:.3g} % more than arcs through its points "
+        f"{curve.source}: {curve.length_mm:.2f} mm long, {100 * share:.3g} % more than arcs through its points "
         f"{CHORD_MM:g} mm apart, allowed {100 * LONGER:g} %: it zigzags, as from voxel to voxel, or its "
         "points scatter; its length is taken for the wire's: smooth it"
     )
-    return replace(curve, status=FrameStatus.TRACE_FAILED, note=note)
+    return curve.doubted(FrameStatus.TRACE_FAILED, note)
 
 
 def _in_lumen(curve: Curve, distance: Grid, stiffness_N_mm2: float) -> Curve:
@@ -88,14 +89,14 @@ def _in_lumen(curve: Curve, distance: Grid, stiffness_N_mm2: float) -> Curve:
     voxel = float(distance.spacing_mm.min())
     allowed = max(OUTSIDE_VOXELS * voxel, may_lie_outside_mm(voxel, stiffness_N_mm2))
     share = float(np.mean(outside_mm(distance, resample(curve.points_mm, 0.5 * voxel)) > allowed))
-    if curve.status is not FrameStatus.OK or share <= MOST_OUTSIDE:
+    if curve.refused or share <= MOST_OUTSIDE:
         return curve
     note = (
-        f"{curve.note}: {100 * share:.3g} % of the curve lie over {allowed / voxel:.2g} voxels outside the lumen, "
+        f"{curve.source}: {100 * share:.3g} % of the curve lie over {allowed / voxel:.2g} voxels outside the lumen, "
         f"allowed {100 * MOST_OUTSIDE:.0f} %; are lumen and curve in the same coordinates (LPS mm), and of the same "
         "phantom?"
     )
-    return replace(curve, status=FrameStatus.TRACE_LEFT_LUMEN, note=note)
+    return curve.doubted(FrameStatus.TRACE_LEFT_LUMEN, note)
 
 
 def rough(curves: Mapping[int, Array], voxel_mm: float, whose: str, mend: str) -> list[str]:

@@ -14,9 +14,9 @@ from numpy.typing import ArrayLike
 from pipeline.arrays.polyline import at_arc, samples
 from pipeline.compare.metrics import point_to_curve, rms
 from pipeline.model import Array, Curve
-from pipeline.run.stages.known import Frame
+from pipeline.run.stages.known import Frame, trusted
 from pipeline.status import FrameStatus
-from reports.case_files import listed
+from reports.case_files import frames_named
 
 ALIKE = 0.4
 """Distance between two traces over their standard deviation, below which they are of one wire that lay still: two scans
@@ -49,7 +49,7 @@ def once(frames: Sequence[Frame], calibrated: Collection[str] = (), traced_mm: S
     for n, frame in enumerate(frames):
         same = first.setdefault(frame.voxels, n)
         whose = OF_CALIBRATION if frame.voxels in calibrated else f"frame {same}" if frame.voxels and same != n else ""
-        why = _the_same(frame.voxels, whose) if whose else _alike(frame, learnt)
+        why = _the_same(frame.voxels, whose) if whose else _alike(frame.open_curve, learnt)
         out[n] = _repeated(frame, why) if why else frame
     return out
 
@@ -60,7 +60,7 @@ def alike(frames: Sequence[Frame]) -> list[str]:
     said: list[str] = []
     for frame in frames:
         if (curve := frame.trusted_curve) is not None:
-            said += [f"frame {frame.index} {why}"] if (why := _alike(frame, earlier)) else []
+            said += [f"frame {frame.index} {why}"] if (why := _alike(curve, earlier)) else []
             earlier.append((f"frame {frame.index}", kept(curve)))
     if not said:
         return []
@@ -80,7 +80,7 @@ def rescanned(frames: Sequence[Frame], traced_mm: Sequence[ArrayLike]) -> list[s
     if not again:
         return []
     return [
-        f"frames {listed([*map(str, again)])} lie where scans that were calibrated with do, as one insertion does that "
+        f"{frames_named([*again])} lie where scans that were calibrated with do, as one insertion does that "
         "is scanned again: what has taught the parameters is no test of them; take it out, unless the wire was drawn "
         "out and pushed in again between the scans"
     ]
@@ -95,8 +95,8 @@ def copies(
     """
     learnt, found = _learnt(traced_mm, whose), dict[int, str]()
     for frame in frames:
-        if frame.trusted_curve is not None:
-            found[frame.index] = _the_same(frame.voxels, whose) if frame.voxels in voxels else _alike(frame, learnt)
+        if (curve := frame.trusted_curve) is not None:
+            found[frame.index] = _the_same(frame.voxels, whose) if frame.voxels in voxels else _alike(curve, learnt)
     return _again(frames, learnt, ALIKE) | {number: why for number, why in found.items() if why}
 
 
@@ -107,24 +107,23 @@ def scanned_twice(frames: Sequence[Frame], traced_mm: Sequence[ArrayLike], case:
     """
     again = _again(frames, _learnt(traced_mm), ONE_WIRE)
     return [
-        f"frames {listed([*map(str, again)])} lie where those of case {case!r} do, and count as another insertion: "
+        f"{frames_named([*again])} lie where those of case {case!r} do, and count as another insertion: "
         "if it is one that was scanned again, state the same group for both"
     ] * bool(again)
 
 
 def _again(frames: Sequence[Frame], learnt: Sequence[tuple[str, Array]], sigmas: float) -> dict[int, str]:
     """By number the frames that lie where others do, and in words where; none where so few are that it is chance."""
-    trusted = [_supposed(frame) for frame in frames if frame.trusted_curve is not None]
-    found = {frame.index: why for frame in trusted if (why := _alike(frame, learnt, sigmas))}
-    return found if len(found) >= max(LEAST_AGAIN, 0.5 * len(trusted)) else {}
+    curves = {number: _supposed(curve) for number, curve in trusted(frames).items()}
+    found = {number: why for number, curve in curves.items() if (why := _alike(curve, learnt, sigmas))}
+    return found if len(found) >= max(LEAST_AGAIN, 0.5 * len(curves)) else {}
 
 
-def _supposed(frame: Frame) -> Frame:
-    """The frame; a curve of the user's own, which states no standard deviation, with that of a scan's trace."""
-    curve = frame.curve
-    if curve is None or not np.isnan(curve.sigma_mm).all():
-        return frame
-    return replace(frame, curve=replace(curve, sigma_mm=np.full(len(curve.points_mm), OWN_MM), tip_sigma_mm=OWN_TIP_MM))
+def _supposed(curve: Curve) -> Curve:
+    """The curve; one of the user's own, which states no standard deviation, with that of a scan's trace."""
+    if not np.isnan(curve.sigma_mm).all():
+        return curve
+    return replace(curve, sigma_mm=np.full(len(curve.points_mm), OWN_MM), tip_sigma_mm=OWN_TIP_MM)
 
 
 def kept(curve: Curve) -> Array:
@@ -141,12 +140,11 @@ def _the_same(voxels: str, whose: str) -> str:
     return f"ends where {whose} does, to 0.01 mm" if voxels.startswith(TIP) else f"has the voxels of {whose}"
 
 
-def _alike(frame: Frame, earlier: Sequence[tuple[str, Array]], sigmas: float = ALIKE) -> str:
+def _alike(curve: Curve | None, earlier: Sequence[tuple[str, Array]], sigmas: float = ALIKE) -> str:
     """As which earlier scan a frame is traced, in words; empty where as none, or where nobody knows how well it is.
 
     sigmas : standard deviations of a trace by which it may be off.
     """
-    curve = frame.trusted_curve
     if curve is None:
         return ""
     near = sigmas * float(np.median(curve.sigma_mm))

@@ -1,7 +1,6 @@
 """Whether the traced wire is as thick as the manifest's: a diameter is easily given for a radius, a rod for a wire."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,14 +48,14 @@ def not_too_thick(curve: Curve, lumen: Lumen, radius_mm: float) -> Curve:
     most = max(MOST_SHARE * radius_mm, radius_mm + MORE_VOXELS * voxel)
     if curve.length_mm < SHORTEST_VOXELS * voxel:
         return curve
-    if curve.status is not FrameStatus.OK or not seen > most or LEVEL in curve.levels:  # what is cut off looks wide
+    if curve.refused or not seen > most or LEVEL in curve.levels:  # what is cut off looks wide
         return curve
     note = (
         f"trace: wire: got a line that looks {2.0 * seen:.2f} mm thick; expected {2.0 * most:.2f} mm at most of a wire "
         f"of radius_mm = {radius_mm:g}; look whether it is a catheter or a rod (state the catheter), or another wire "
         "(correct radius_mm)"
     )
-    return replace(curve, status=FrameStatus.TRACE_AMBIGUOUS, note=note)
+    return curve.doubted(FrameStatus.TRACE_AMBIGUOUS, note)
 
 
 def _seen_radius_mm(blur_mm: float, lumen: Lumen, least_voxels: float = 0.0) -> float:

@@ -44,7 +44,7 @@ from pipeline.run.straightened import straightened
 from pipeline.segment.opened import opened
 from pipeline.simulate import wall_of
 from pipeline.status import FrameStatus, StageError
-from pipeline.trace import cleared, of_catheter, trace
+from pipeline.trace import DIM_FROM_TIP, of_catheter, trace
 from pipeline.trace.config import TraceConfig
 from pipeline.trace.saturated import cut_off, saturated
 
@@ -257,7 +257,8 @@ def _pictured(frame: Frame, shown: Volume, window: tuple[float, float]) -> Frame
 
 def _last_curve(number: int, earlier: Earlier[_Part]) -> Curve:
     """The last good curve before this frame, which tells which of two strands is the wire's; NOTHING without one."""
-    curves = (cleared(curve) for k in reversed(range(number)) if (curve := earlier(k).frame.curve) is not None)
+    seen = (earlier(k).frame.curve for k in reversed(range(number)))
+    curves = (curve.without(DIM_FROM_TIP) for curve in seen if curve is not None)
     return next((curve for curve in curves if curve.status is FrameStatus.OK and len(curve.points_mm)), NOTHING)
 
 
