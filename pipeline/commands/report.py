@@ -77,9 +77,10 @@ def main(args: argparse.Namespace) -> int:
 def _without_cases(out: Path) -> str:
     """What is wrong with a folder without results."""
     from pipeline.run.results import found_results
+    from reports.records import run_records
 
     above = [f"give {one}" for one in out.absolute().parents[:2] if found_results(one)]
-    begun = any(out.glob("run*.json"))
+    begun = bool(run_records(out))
     why = "the run into it has finished no case: run it again" if begun else "this is not an output of wireval run"
     return f"{out}: no cases/*/result.json below it; {next(iter(above), why)}"
 

@@ -15,7 +15,7 @@ from pipeline.run.aggregate import Totals, aggregate
 from pipeline.run.batch import elsewhere, run_all
 from pipeline.run.cache import Store, forget_lumen
 from pipeline.run.case import Job, clear, each_on, finished, run_case
-from pipeline.run.earlier import remove_arrays, remove_others, remove_records
+from pipeline.run.earlier import remove_arrays, remove_others, remove_over_all, remove_records
 from pipeline.run.gate import Gate
 from pipeline.run.hashing import file_hash
 from pipeline.run.inputs import stated
@@ -37,7 +37,7 @@ from reports.atomic import WriteError, remove_leftovers, write_text, writing
 from reports.case_files import counted, provenance_of
 from reports.doubts import AMONG
 from reports.gates import GATES
-from reports.records import read_json
+from reports.records import read_json, run_records
 from reports.run_page import render_index
 from reports.schema import FAILURES, OVERALL_FILE, SUMMARY, SWEEP, TIMINGS
 from reports.sweep import not_run
@@ -168,18 +168,17 @@ def launch(plan: Plan) -> tuple[Totals, Path]:
     info |= {"to_score": {case.id: case.frames_to_score for case in plan.manifest.cases if case.frames_to_score}}
     info |= {"fail_if": [gate.text for gate in plan.gates]}
     name = f"run.{plan.shard.replace('/', '-')}.json" if plan.shard else "run.json"
-    remove_arrays(out, name)
     info |= {"left_out": _never_asked(out / name, plan.left_out), "config": settings.as_dict()}
+    swept, ran = (out / SWEEP.file).exists(), bool(run_records(out))
     try:
+        remove_arrays(out, name)
         write_json(out / name, info | {"cases": []})
         write_text(out / "config.resolved.toml", to_toml(settings))
         write_json(provenance_of(out / name), this_run())
+        remove_over_all(out, OVER_ALL, ran=ran)
     except WriteError as error:
         raise UsageError([str(error)]) from error
     remove_leftovers(out)
-    swept = (out / SWEEP.file).exists()
-    for earlier in OVER_ALL:
-        (out / earlier).unlink(missing_ok=True)
     if plan.template.fresh:
         remove_others(out, info["manifest_sha256"])
     elif not plan.shard and not plan.left_out:
