@@ -14,6 +14,7 @@ from pipeline.load import metaimage, nifti, nrrd
 from pipeline.load.config import LoadConfig
 from pipeline.load.geometry import Box, Header, LoadError, Source, unusable
 from pipeline.load.guard import status_of
+from pipeline.load.order import in_order
 from pipeline.load.voxels import Head, read_box, require_data
 
 OWN = {
@@ -70,3 +71,16 @@ def read(header: Header, box: Box, config: LoadConfig) -> NDArray[Any]:
     """Voxels of ``box`` alone, indexed x, y, z."""
     path, item = header.source.path, header.source.item or 0
     return read_box(head_of(path, config.most_gib), item, box)
+
+
+def held_in(folder: Path) -> str:
+    """What else lies in a folder that is no series, and how to name it; empty where nothing does."""
+    there = in_order(folder.iterdir(), lambda path: path.name)
+    below = [path.name for path in there if path.is_dir()]
+    scans = [path.name for path in there if path.name.lower().endswith(tuple(OWN))]
+    if below:
+        return f"It has sub-folders: {', '.join(below[:5])}; name one of them, as in {folder.name}/{below[0]}.\n"
+    if not scans:
+        return ""
+    end = next(end for end in OWN if scans[0].lower().endswith(end))
+    return f"It holds scans, as {scans[0]}; name these, as in {folder.name}/*{end}.\n"

@@ -2,6 +2,7 @@
 
 import gc
 import math
+import re
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager, suppress
@@ -134,9 +135,9 @@ def chosen(cases: Sequence[Case], only: Sequence[str], shard: str) -> tuple[Case
 
 
 def _shard(text: str) -> tuple[int, int]:
-    parts = text.split("/")
-    if len(parts) == 2 and all(p.isascii() and p.isdigit() for p in parts) and 1 <= int(parts[0]) <= int(parts[1]):
-        return int(parts[0]), int(parts[1])
+    found = re.fullmatch(r"([0-9]{1,6})/([0-9]{1,6})", text)  # both are in the name of a file
+    if found and 1 <= int(found[1]) <= int(found[2]):
+        return int(found[1]), int(found[2])
     raise UsageError([f"--shard {text!r}: expected I/N with 1 <= I <= N, as in 3/20"])
 
 

@@ -367,6 +367,28 @@ def test_report_heals_pages(study: Path, whole: Path, out: Path) -> None:
     assert differences(whole, out) == []
 
 
+def test_a_case_whose_run_goes_on_is_missing_for_the_exit_code_too(
+    out: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """ "1 case without a result" was printed, and a run that ended while pages were drawn made it exit 0."""
+    info = json.loads((out / "run.json").read_text(encoding="utf-8"))
+    (out / "run.json").write_text(json.dumps(info | {"planned": ["bifurcation", "late"]}), encoding="utf-8")
+
+    def drawn(*_: object) -> bool:
+        shutil.copytree(case_of(out), out / "cases" / "late")
+        return True
+
+    monkeypatch.setattr("pipeline.commands.report._all_drawn", drawn)
+    assert main(["report", str(out)]) == 1
+    assert "1 case without a result" in capsys.readouterr().out
+
+
+def test_an_output_that_is_removed_is_told_for_gone(tmp_path: Path) -> None:
+    """ "make room or allow writing there" was said of it."""
+    with pytest.raises(atomic.WriteError, match="its folder is gone: leave it in its place"), atomic.writing(tmp_path):
+        (tmp_path / "gone" / "log.txt").open("a", encoding="utf-8")
+
+
 def test_files_of_a_users_own_stay_among_those_of_a_run(
     study: Path, out: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -6,6 +6,7 @@ import json
 import os
 import re
 import struct
+import tracemalloc
 from collections.abc import Callable
 from contextlib import nullcontext
 from pathlib import Path
@@ -33,7 +34,7 @@ from pipeline.study.parameters import read_parameters
 from pipeline.study.settings import SettingsError, parse_assignment, read_settings
 from reports.export import write_markups_curve, write_polyline_vtp, write_surface_vtp
 from reports.records import read_json
-from reports.texts import UnreadableError
+from reports.texts import UnreadableError, read_bytes
 from reports.tolerance import load_tolerance
 from tests.fuzz.inputs import markups, stl, tetrahedra, vtp
 
@@ -390,6 +391,15 @@ def test_a_markup_that_is_no_open_curve_is_no_wire(tmp_path: Path, kind: str) ->
     (tmp_path / "a.mrk.json").write_text(json.dumps({"markups": [{"type": kind, "controlPoints": points}]}))
     with pytest.raises(LoadError, match=f"a markup of type '{kind}'"):
         read_curve(tmp_path / "a.mrk.json")
+
+
+def test_a_small_file_takes_no_memory_for_the_longest(tmp_path: Path) -> None:
+    """Of a file of three bytes 256 MiB were asked for, a MemoryError under a limit of memory."""
+    (tmp_path / "a").write_bytes(b"abc")
+    tracemalloc.start()
+    assert read_bytes(tmp_path / "a", 2**26) == b"abc"
+    assert tracemalloc.get_traced_memory()[1] < 2**20
+    tracemalloc.stop()
 
 
 def test_one_table_of_all_frames_is_told_how_to_be_split(tmp_path: Path) -> None:
