@@ -25,6 +25,7 @@ def writing(path: Path) -> Iterator[None]:
     except OSError as error:
         reason = error.strerror or str(error)
         do = "remove this folder, or give it another name" if path.is_dir() else "make room or allow writing there"
+        do = "its folder is gone: leave it in its place" if isinstance(error, FileNotFoundError) else do
         what = f"{path}: cannot be written: {reason}; {do}"
         raise WriteError(f"{what}, then give the same command again: what is finished is kept") from error
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from reports import frames_file, tables
 from reports.frames_file import FrameArrays, ScanCrop
-from reports.records import ALWAYS, read_json
+from reports.records import ALWAYS, read_json, run_records
 from reports.result_file import read_result
 from reports.schema import ERRORS, POINTS, TIMINGS
 from reports.texts import size_of
@@ -229,7 +229,7 @@ def runs_in(out_dir: Path) -> list[dict[str, Any]]:
     ``wireval run`` refuses.
     """
     try:
-        return [read_json(path) for path in sorted(sorted(out_dir.glob("run*.json")), key=_began)]
+        return [read_json(path) for path in sorted(run_records(out_dir), key=_began)]
     except ValueError:
         return []
 

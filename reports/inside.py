@@ -6,21 +6,27 @@ from pathlib import Path
 
 from reports.case_files import listed
 
+FOLDERS = "cases", "figures", "simulators", "sweep", "view"
+"""Folders in which runs write, and remove what they wrote."""
+
 
 def misleading_links(out: Path) -> list[str]:
-    """A sentence each on links below ``out`` that lead out of it, and on cases that are links to others within it.
+    """A sentence each on links below ``out`` that lead out of it, and on cases and folders that are links within it.
 
-    What is written through the first would land elsewhere; a case behind a link would be counted under two names.
+    What is written through these would land elsewhere; a case behind a link would be counted under two names.
     """
-    root, leading_out, twice = out.resolve(), [], []
+    root, leading_out, twice, within = out.resolve(), [], [], []
     for path in _links(out):
         if not _target(path).is_relative_to(root):
             leading_out.append(path)
         elif path.parent.name == "cases":
             twice.append(path)
+        elif path.name in FOLDERS and path.is_dir():
+            within.append(path)
     return [
         *_said(leading_out, f"{out}: links lead out of it", "outputs follow none: remove them, or name another -o"),
         *_said(twice, f"{out}: a case is a link to another", "it would be counted twice: remove it"),
+        *_said(within, f"{out}: folders that runs write into are links", "outputs follow none: remove them"),
     ]
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from reports.case_files import counted, listed, manifests_in, results_in, runs_in
-from reports.records import read_json
+from reports.records import read_json, run_records
 from reports.schema import OURS
 
 CODE = {"wireval": "wireval", "git_commit": "commit", "git_dirty": "changed files", "python": "Python"}
@@ -83,7 +83,7 @@ def why_not_pooled(*outs: Path) -> str:
 
 def _of_other_arrays(out: Path) -> str:
     """The sentence on shards of several arrays that were merged: a case may be what an earlier one made of it."""
-    sizes = {int(size) for path in out.glob("run.*-*.json") if (size := path.stem.rpartition("-")[2]).isdecimal()}
+    sizes = {int(path.stem.rpartition("-")[2]) for path in run_records(out) if "-" in path.name}
     if len(sizes) < 2:
         return ""
     counts = " and of ".join(map(str, sorted(sizes)))
@@ -139,7 +139,7 @@ def settings_of(result: Mapping[str, Any]) -> Told:
 
 def _whole(out: Path, found: Mapping[str, Mapping[str, Any]]) -> Told:
     """Settings, code and manifest; a folder whose cases tell nothing has those of its runs."""
-    runs = {path.name: read_json(path) for path in sorted(out.glob("run*.json"))}
+    runs = {path.name: read_json(path) for path in run_records(out)}
     told = _over({name: _made(r) | _code(r) for name, r in found.items()})
     told = told or _over({name: _made(r) | _code(r) for name, r in runs.items()})
     hashes = manifests_in(runs.values())

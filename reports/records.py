@@ -3,6 +3,7 @@
 A file that a disk or an editor has damaged is named; nothing is taken from it.
 """
 
+import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,7 @@ ALWAYS = ("result.json", "errors.csv", "frames.h5", "timings.csv", "provenance.j
 """The files of every case that went through the stages, however far and however well, that is of every ledger."""
 KEYS = {"sweep": ("parameter", "value", "unchanged"), "inputs": ("path", "sha256"), "frames": ("frame",)}
 """What each object in such a list names."""
+_RUN = re.compile(r"run(?:\.\d+-\d+)?\.json")
 
 
 def read_json(path: Path) -> dict[str, Any]:
@@ -54,10 +56,18 @@ def _holds(value: Any, kinds: Sequence[type[Any]], keys: Iterable[str]) -> bool:
     )
 
 
+def run_records(out_dir: Path) -> list[Path]:
+    """What the runs into a folder say of themselves, by name: run.json, and run.I-N.json of shards.
+
+    A user's own run_notes.json is none: one was taken for damaged, and removed.
+    """
+    return sorted(path for path in out_dir.glob("run*.json") if _RUN.fullmatch(path.name))
+
+
 def damaged_records(out_dir: Path) -> list[str]:
     """A sentence each on what the runs into a folder say of themselves, where that cannot be read."""
     found = []
-    for path in sorted(out_dir.glob("run*.json")):
+    for path in run_records(out_dir):
         try:
             read_json(path)
         except texts.UnreadableError as error:

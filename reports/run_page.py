@@ -30,7 +30,7 @@ from reports.figures import RunFiles, declared
 from reports.gates import gates_in
 from reports.origin import why_not_pooled
 from reports.page import Each, draw_sections, one_by_one, write_page
-from reports.records import read_json
+from reports.records import read_json, run_records
 from reports.schema import FAILURES, OVERALL_FILE, SIMULATORS, SUMMARY, SWEEP
 from reports.sweep import not_run_sentence as not_swept_sentence
 from reports.sweep import silent_points
@@ -48,7 +48,7 @@ def render_index(out_dir: Path, embed: bool = False, each: Each = one_by_one) ->
     drawn = [case for case in cases if (case.folder / "report.html").exists()]
     links = {case.name: f"cases/{quote(case.folder.name)}/report.html" for case in drawn}
     failures += _run_failures(out_dir, cases, links)
-    runs = {path.name: read_json(path) for path in sorted(out_dir.glob("run*.json"))}
+    runs = {path.name: read_json(path) for path in run_records(out_dir)}
     infos, row = list(runs.values()), first_row(whole)
     uncounted = damaged | set(summary["case"][summary["role"] == "calibration"])
     missing, gates, aside = not_run(out_dir), gates_in(out_dir), _not_counted(out_dir)

@@ -88,7 +88,7 @@ def opened(path: Path, most: float = float("inf")) -> BinaryIO:
 def read_bytes(path: Path, most: int) -> bytes:
     """A whole regular file of at most ``most`` bytes."""
     with opened(path, most) as file:
-        return file.read(most + 1)[:most]
+        return file.read(min(os.fstat(file.fileno()).st_size, most))  # Python sets aside as much as is asked for
 
 
 def read_text(path: Path, most: int = TEXT_BYTES) -> str:

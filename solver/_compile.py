@@ -14,6 +14,7 @@ the end (``part_of_callers``), not once more at every step of the way, which too
 import functools
 import hashlib
 import re
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NoReturn, TypeVar, cast
@@ -80,7 +81,8 @@ class _ByTypes(_Numbered):  # type: ignore[misc]
 
     def save(self, key: tuple[Any, ...], data: Any) -> None:
         """Keep what was compiled for a key: types, processor, hashes of the function's own code."""
-        types = hashlib.sha256(repr(key[:2]).encode()).digest()
+        # without docstrings (-OO) numba's key is another one: each would take the other's file, and compile it anew
+        types = hashlib.sha256(repr((key[:2], sys.flags.optimize)).encode()).digest()
         name = self._data_name(int.from_bytes(types[:5]))
         self._save_data(name, ((self._source_stamp, key), data))
         self._save_index(self._load_index() | {key: name})

@@ -57,6 +57,23 @@ def test_an_edited_callee_is_compiled_again(package: str, tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize("package", ONE)
+def test_code_without_docstrings_is_kept_beside_that_with_them(package: str, tmp_path: Path) -> None:
+    """PYTHONOPTIMIZE=2 and a plain run took each other's files, so that each compiled all anew."""
+    folder = tmp_path / package
+    folder.mkdir()
+    (folder / "__init__.py").touch()
+    (folder / "_compile.py").write_text((ROOT / package / "_compile.py").read_text(encoding="utf-8"))
+    text = f'from {package}._compile import on_disk\n\n@on_disk()\ndef caller():\n    "Why."\n    return 1\n'
+    (folder / "caller.py").write_text(text, encoding="utf-8")
+    for options in ((), ("-OO",)):
+        called(tmp_path, package, *options)
+    before = {path: path.stat().st_mtime_ns for path in folder.rglob("*.nbc")}
+    assert len(before) == 2
+    called(tmp_path, package)
+    assert {path: path.stat().st_mtime_ns for path in before} == before
+
+
+@pytest.mark.parametrize("package", ONE)
 def test_two_processes_that_compile_at_one_time_do_not_mix_their_code(package: str, tmp_path: Path) -> None:
     """Both took the number 1, and one's types were answered with the other's code ever after: a segmentation fault."""
     kept = import_module(f"{package}._compile")._ByTypes
@@ -107,10 +124,10 @@ def test_a_part_of_callers_runs_in_them_alone(package: str, tmp_path: Path) -> N
     assert [called(tmp_path, package) for _ in range(2)] == [expected, expected]
 
 
-def called(folder: Path, package: str) -> str:
+def called(folder: Path, package: str, *options: str) -> str:
     code = f"from {package}.caller import caller; print(caller())"
     done = subprocess.run(
-        [sys.executable, "-B", "-c", code], cwd=folder, capture_output=True, encoding="utf-8", check=False
+        [sys.executable, "-B", *options, "-c", code], cwd=folder, capture_output=True, encoding="utf-8", check=False
     )
     assert done.returncode == 0, done.stderr
     return done.stdout.strip()

@@ -54,18 +54,24 @@ def _text(path: Path) -> str:
     return path.read_text(encoding="utf-8", errors="replace") if path.is_file() else ""
 
 
-def in_the_way(folder: Path, format: str, frames: int) -> list[str]:
-    """A sentence for what else in the folder a study would overwrite, or would be read together with."""
+def in_the_way(folder: Path, format: str, frames: int, *, fresh: bool = False) -> list[str]:
+    """A sentence for what else in the folder a study would overwrite, or would be read together with.
+
+    fresh : files that have the names of ours may be overwritten, in whatever study they are.
+    """
     if folder.is_file():
         return [f"{folder}: is a file; give a folder"]
     ours, manifest = set(earlier_files(folder)), folder / MANIFEST
     if manifest.exists() and manifest not in ours:
         return [f"{manifest}: is not a manifest that synth wrote; give another folder"]
     names = volume_names(format, frames)
+    meant = {folder / name for name in (HDF5_FILE, TRUTH)} if format == "h5" else {folder / n for n in (*names, TRUTH)}
     there = {*folder.glob(f"frames/*.{format}"), *(p for name in names for p in folder.glob(f"{name}/*"))}
-    strange = sorted(there - ours - {folder / name for name in names})
+    strange = sorted(there - ours - meant)
     what = "would be read as a part of the study; remove it or give another folder"
-    return [f"{path}: {what}" for path in strange[:1]]
+    taken = [] if fresh else sorted(path for path in meant - ours if path.is_file())
+    whose = "is in no study that synth wrote; give another folder, or --fresh, which overwrites it"
+    return [f"{path}: {what}" for path in strange[:1]] or [f"{path}: {whose}" for path in taken[:1]]
 
 
 def remove_earlier(folder: Path) -> None:
@@ -80,35 +86,38 @@ def remove_earlier(folder: Path) -> None:
 Progress = Callable[[int, int], None]
 
 
-def write_study(study: Study, folder: str | Path, format: str = "mha", progress: Progress | None = None) -> Path:
-    """Write reference, frames, truth.json and manifest.toml into ``folder``; returns the manifest's path.
+def write_study(
+    study: Study, folder: str | Path, format: str = "mha", progress: Progress | None = None, *, fresh: bool = False
+) -> Path:
+    """Write manifest.toml, truth.json, reference and frames into ``folder``; returns the manifest's path.
 
-    format : one of FORMATS.     progress : called with (frames done, frames in all).
+    format : one of FORMATS.     progress : called with (frames done, frames in all).     fresh : as ``in_the_way``.
     An earlier study in the folder is removed first; ValueError where something else lies in the way.
     """
     folder, frames = Path(folder), len(study.truth)
     if format not in FORMATS:
         allowed = f"allowed: {', '.join(FORMATS)}; choose one"
         raise ValueError(f"synthetic study {study.name}: format: got {format!r}; {allowed}")
-    problems = in_the_way(folder, format, frames)
+    problems = in_the_way(folder, format, frames, fresh=fresh)
     if problems:
         raise ValueError("; ".join(problems))
     remove_earlier(folder)
     folder.mkdir(parents=True, exist_ok=True)
+    # first, so that the volumes of a study that was interrupted are known for ours
+    manifest = folder / MANIFEST
+    (folder / TRUTH).write_text(json.dumps(truth_record(study)), encoding="utf-8")
+    manifest.write_text(_sealed(manifest_text(study, format)), encoding="utf-8")
     write_volume(folder, format, 0, study.reference, study.grid)
     for i, frame in enumerate(study.frames(), 1):
         write_volume(folder, format, i, frame, study.grid)
         if progress is not None:
             progress(i, frames)
-    (folder / TRUTH).write_text(json.dumps(truth_record(study)), encoding="utf-8")
-    manifest = folder / MANIFEST
-    manifest.write_text(_sealed(manifest_text(study, format)), encoding="utf-8")
     return manifest
 
 
-def write_one_of(study: Study, folder: Path, number: int, format: str = "mha") -> str:
+def write_one_of(study: Study, folder: Path, number: int, format: str = "mha", *, fresh: bool = False) -> str:
     """Write one of several insertions as a study in a folder of its own; returns its part of the manifest of all."""
-    write_study(study, folder / str(number), format)
+    write_study(study, folder / str(number), format, fresh=fresh)
     return manifest_text(study, format, f"{number}/", wires=number == 1)
 
 

@@ -8,6 +8,7 @@ from pipeline.commands import complain, say
 
 HELP = "lumens, traces and the like that are kept, so that no run computes them again"
 UNITS = {"K": 2**10, "M": 2**20, "G": 2**30, "T": 2**40}
+MOST = 2**63
 """A size has one: `--limit 5`, meant as 5 GB, would remove all but 5 bytes."""
 
 
@@ -49,6 +50,7 @@ def main(args: argparse.Namespace) -> int:
 
 
 def _bytes(text: str) -> int | None:
-    """A size in bytes; None for what is no size, or has no unit."""
+    """A size in bytes; None for what is no size, has no unit, or is more than any disk holds."""
     found = re.fullmatch(r"(\d+(?:\.\d+)?)\s*([KMGT])(?:i?B)?", text.strip(), re.IGNORECASE)
-    return int(float(found[1]) * UNITS[found[2].upper()]) if found else None
+    size = float(found[1]) * UNITS[found[2].upper()] if found else MOST
+    return int(size) if size < MOST else None

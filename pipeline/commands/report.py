@@ -71,15 +71,16 @@ def main(args: argparse.Namespace) -> int:
     first = next((f"{name}: " for name in folders_in(args.out)), "")
     sys.stderr.writelines(f"FAIL: {first}{line}\n" for line in totals.closed)
     say(last_line(totals, page))
-    return 0 if totals.all_ok and not totals.closed and others_ok and drawn and whole else 1
+    return 0 if totals.all_ok and not (totals.closed or totals.missing) and others_ok and drawn and whole else 1
 
 
 def _without_cases(out: Path) -> str:
     """What is wrong with a folder without results."""
     from pipeline.run.results import found_results
+    from reports.records import run_records
 
     above = [f"give {one}" for one in out.absolute().parents[:2] if found_results(one)]
-    begun = any(out.glob("run*.json"))
+    begun = bool(run_records(out))
     why = "the run into it has finished no case: run it again" if begun else "this is not an output of wireval run"
     return f"{out}: no cases/*/result.json below it; {next(iter(above), why)}"
 
@@ -164,7 +165,12 @@ def _others(out: Path, *, embed: bool) -> bool:
     for name, folder in [*folders.items()][1:]:
         totals = aggregate(folder)
         sys.stderr.writelines(f"FAIL: {name}: {line}\n" for line in totals.closed)
-        good += [totals.all_ok, not totals.closed, _all_there(folder, found_results(folder), f"{name}: ")]
+        good += [
+            totals.all_ok,
+            not totals.closed,
+            not totals.missing,
+            _all_there(folder, found_results(folder), f"{name}: "),
+        ]
         say(f"{name}: report: {render_index(folder, embed)}")
     for line in side_by_side(out, folders, embed) if folders else ():
         say(line)

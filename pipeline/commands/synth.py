@@ -46,7 +46,11 @@ def add_arguments(parser: ArgumentParser) -> None:
     add(
         "--scanner", default="psf", choices=("psf", "conebeam"), help="ideal, or 3D rotational X-ray (extra [conebeam])"
     )
-    add("--fresh", action="store_true", help="overwrite a study whose manifest was changed since it was written")
+    add(
+        "--fresh",
+        action="store_true",
+        help="overwrite a manifest that was changed since, and files that are in no study of synth",
+    )
     add_quiet(parser)
 
 
@@ -148,7 +152,7 @@ def _one(args: Namespace) -> int:
     try:
         scene = _scene(args)
         problems = catalogue.Wanted(**numbers).problems(scene, args.scanner)
-        problems = problems or in_the_way(args.out, args.format, args.frames or scene.frames)
+        problems = problems or in_the_way(args.out, args.format, args.frames or scene.frames, fresh=args.fresh)
         problems = problems or edited(args.out) * (not args.fresh)
         if problems:
             return complain(problems, "the command line")
@@ -167,7 +171,8 @@ def _one(args: Namespace) -> int:
     if earlier:
         chat(f"{args.out}: an earlier study is replaced: its {earlier} files are removed")
     with _written(args.out):
-        manifest = write_study(study, args.out, format=args.format, progress=None if args.quiet else _progress)
+        shown = None if args.quiet else _progress
+        manifest = write_study(study, args.out, args.format, shown, fresh=args.fresh)
     say(f"{study.name}: written in {perf_counter() - clock:.0f} s.  manifest: {manifest}")
     return 0
 
@@ -185,7 +190,7 @@ def _several(args: Namespace) -> int:
             alone(args.out) or edited(args.out) * (not args.fresh)
         )
         folders = [] if problems else [args.out / str(n + 1) for n in range(args.insertions)]
-        problems += [problem for folder in folders for problem in in_the_way(folder, args.format, frames)]
+        problems += [text for folder in folders for text in in_the_way(folder, args.format, frames, fresh=args.fresh)]
     except ValueError as error:
         problems = [str(error)]
     if problems:
@@ -212,7 +217,8 @@ def _share(args: Namespace, numbers: range) -> dict[int, str]:
     plan, written = catalogue.prepare(_scene(args), catalogue.SCANNERS[args.scanner], _wanted(args)), {}
     for number in numbers:
         with _written(args.out / str(number + 1)):
-            written[number] = write_one_of(catalogue.insertion_into(plan, number), args.out, number + 1, args.format)
+            study = catalogue.insertion_into(plan, number)
+            written[number] = write_one_of(study, args.out, number + 1, args.format, fresh=args.fresh)
         if not args.quiet:
             sys.stderr.write(f"insertion {number + 1}/{args.insertions}\n")
     return written

@@ -58,7 +58,7 @@ class Format(Protocol):
 
 
 FORMATS: tuple[Format, ...] = (dicom, hdf5, files)
-"""The first that recognises a path reads it; ``files`` leaves the rest to SimpleITK."""
+"""The first that recognises a path reads it; ``files`` recognises any, and refuses the rest."""
 SUFFIXES = (".mha", ".mhd", ".nrrd", ".nhdr", ".nii", ".nii.gz", ".hdr")
 """By these a file in a folder is taken for a scan where there is no manifest."""
 
@@ -68,7 +68,7 @@ def read_header(
 ) -> Header:
     """Geometry of a scan without its voxels.
 
-    source : a file (.mha .mhd .nrrd .nhdr .nii .nii.gz .dcm .h5) or a folder with one DICOM series (an
+    source : a file (.mha .mhd .nrrd .nhdr .nii .nii.gz .hdr .dcm .h5) or a folder with one DICOM series (an
     enhanced multi-frame .dcm counts as one).
     spacing_mm : (3,) overrides what the file says; the header then lists it as assumed.
     Raises LoadError: unreadable, not 3-D, sheared, tilted, missing slices, mixed series.

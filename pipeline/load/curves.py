@@ -44,12 +44,17 @@ def of_json(found: list[Any]) -> NDArray[np.float64]:
     return values.astype(np.float64)
 
 
+def unit_of_markup(markup: dict[str, Any]) -> str:
+    """Of its coordinates, and of what is measured in lengths and states no other."""
+    return str(markup.get("coordinateUnits", "mm"))
+
+
 def positions_of(path: Path, markup: dict[str, Any]) -> NDArray[np.float64]:
     """Control points (n, 3) of a markup, LPS mm; a file that states no system is LPS, as in 3D Slicer, 0 is RAS."""
     system = str(markup.get("coordinateSystem", "LPS")).upper()
     if system not in SYSTEMS:
         raise refused(path, f"coordinateSystem {system!r}", "LPS or RAS", "save the curve again")
-    factor = millimetres(path, str(markup.get("coordinateUnits", "mm")))
+    factor = millimetres(path, unit_of_markup(markup))
     with told(path):
         each = [(p["position"], p.get("positionStatus", "defined")) for p in markup["controlPoints"]]
     unplaced = [n for n, (_, status) in enumerate(each) if status != "defined"]
@@ -65,10 +70,17 @@ def positions_of(path: Path, markup: dict[str, Any]) -> NDArray[np.float64]:
     return reachable(path, points * SYSTEMS[system] * factor)
 
 
+OPEN = ("Curve", "Line", "Fiducial")
+"""Markups whose points may be a wire: the others enclose something (ClosedCurve, Plane, ROI) or measure it (Angle)."""
+
+
 def read_markups_curve(path: Path) -> NDArray[np.float64]:
     """Control points (n, 3) of the one markup of a file, LPS mm; of several, of the one that is a curve."""
     found = markups_in(path)
-    found = found if len(found) == 1 else [m for m in found if str(m.get("type", "")).endswith("Curve")]
+    kinds = [str(markup.get("type", "Curve")) for markup in found]
+    if len(found) == 1 and kinds[0] not in OPEN:
+        raise refused(path, f"a markup of type {kinds[0]!r}", "a Curve, a Line or points", "draw the wire as a curve")
+    found = found if len(found) == 1 else [m for m, kind in zip(found, kinds, strict=True) if kind == "Curve"]
     if len(found) != 1:
         several = f"{len(found)} curves with control points"
         raise refused(path, several, "one curve", "save the wire's curve alone, as .mrk.json")

@@ -15,6 +15,7 @@ from scipy.ndimage import shift as shift_slice
 
 from pipeline.load import foreign
 from pipeline.load.config import LoadConfig
+from pipeline.load.files import held_in
 from pipeline.load.geometry import Box, Header, LoadError, Source, unusable
 from pipeline.load.guard import is_folder, require_room
 from pipeline.load.order import in_order
@@ -115,14 +116,10 @@ def _planes_in(folder: Path, wanted: str) -> list[Plane]:
     images = {uid: files for uid, files in series.items() if not wanted or uid == wanted}
     if len(images) != 1:
         groups = "".join(f"\n    {_called(*one)}: {len(one[1])} files" for one in series.items())
-        below = [d.name for d in in_order(folder.iterdir(), lambda p: p.name) if d.is_dir()]
-        hint = (
-            f"It has sub-folders: {', '.join(below[:5])}; name one of them, as in {folder.name}/{below[0]}.\n"
-            if below
-            else ""
+        found = f"found {len(images)} DICOM image series, expected one{':' * bool(groups)}{groups or '.'}"
+        raise unusable(
+            folder, f"{found}\n  {held_in(folder)}  Keep one series a folder, or name one as FOLDER#SERIES_UID."
         )
-        found = f"found {len(images)} DICOM image series, expected one{':' * bool(groups)}{groups or '.'}\n  {hint}"
-        raise unusable(folder, f"{found}  Keep one series a folder, or name one as FOLDER#SERIES_UID.")
     return [plane for path, data in next(iter(images.values())) for plane in planes_of(path, data)]
 
 

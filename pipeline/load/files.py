@@ -1,24 +1,27 @@
-"""Single-file volumes: MetaImage, NRRD and NIfTI are read here, anything else by ITK in a child process."""
+"""Volumes in files: MetaImage, NRRD and NIfTI. No other format passes.
+
+ITK reads twenty more, of which some keep header and voxels in two files (.spr and .sdt): a key that knows one of them
+takes a new scan for the old one, and of most of them nobody knows what they say of axes and units.
+"""
 
 import stat
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from numpy.typing import NDArray
 
-from pipeline.load import foreign, metaimage, nifti, nrrd
+from pipeline.load import metaimage, nifti, nrrd
 from pipeline.load.config import LoadConfig
 from pipeline.load.geometry import Box, Header, LoadError, Source, unusable
 from pipeline.load.guard import status_of
+from pipeline.load.order import in_order
 from pipeline.load.voxels import Head, read_box, require_data
 
 OWN = {
     ".mha": metaimage.head_of, ".mhd": metaimage.head_of, ".nrrd": nrrd.head_of, ".nhdr": nrrd.head_of,
     ".nii": nifti.head_of, ".nii.gz": nifti.head_of, ".hdr": nifti.head_of, ".img": nifti.head_of,
 }  # fmt: skip
-
-
+ALLOWED = ".mha, .mhd, .nrrd, .nhdr, .nii, .nii.gz, .hdr with .img (NIfTI), .dcm, .h5 or a folder with one DICOM series"
 NAMED = {
     ".mha": metaimage.data_files, ".mhd": metaimage.data_files, ".nrrd": nrrd.data_files, ".nhdr": nrrd.data_files,
 }  # fmt: skip
@@ -27,16 +30,14 @@ NAMED = {
 def head_of(path: Path, most_gib: float = LoadConfig.most_gib, *, whole: bool = True) -> Head:
     """What a file's header says, checked against the files' lengths; LoadError where it cannot be a scan."""
     read = next((own for suffix, own in OWN.items() if path.name.lower().endswith(suffix)), None)
-    head = read(path) if read else None
-    if head is not None:
-        return require_data(head, most_gib, whole=whole)
-    head = foreign.head_of(path)
-    require_data(replace(head, packing="foreign", parts=((path, 0),)), most_gib)
-    return head
+    if read is None:
+        why = f"cannot read it: by its ending and content it is of none of the formats allowed: {ALLOWED}"
+        raise unusable(path, f"{why}; convert it, or check that it is complete")
+    return require_data(read(path), most_gib, whole=whole)
 
 
 def recognises(_path: Path) -> bool:
-    """Any file: what is none of the formats above is left to ITK."""
+    """Any file: the last to be asked, so that it refuses what is of no format."""
     return True
 
 
@@ -69,8 +70,17 @@ def read_header(source: Source, config: LoadConfig) -> Header:
 def read(header: Header, box: Box, config: LoadConfig) -> NDArray[Any]:
     """Voxels of ``box`` alone, indexed x, y, z."""
     path, item = header.source.path, header.source.item or 0
-    head = head_of(path, config.most_gib)
-    if head.parts:
-        return read_box(head, item, box)
-    with foreign.temporary() as folder:
-        return read_box(foreign.converted([path], head.plane_bytes * head.planes, folder), item, box)
+    return read_box(head_of(path, config.most_gib), item, box)
+
+
+def held_in(folder: Path) -> str:
+    """What else lies in a folder that is no series, and how to name it; empty where nothing does."""
+    there = in_order(folder.iterdir(), lambda path: path.name)
+    below = [path.name for path in there if path.is_dir()]
+    scans = [path.name for path in there if path.name.lower().endswith(tuple(OWN))]
+    if below:
+        return f"It has sub-folders: {', '.join(below[:5])}; name one of them, as in {folder.name}/{below[0]}.\n"
+    if not scans:
+        return ""
+    end = next(end for end in OWN if scans[0].lower().endswith(end))
+    return f"It holds scans, as {scans[0]}; name these, as in {folder.name}/*{end}.\n"

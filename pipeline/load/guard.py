@@ -118,7 +118,8 @@ def skip(file: IO[bytes], count: int, *, packed: bool) -> None:
 def require_room(what: object, need: int, there: int, packing: str, most_gib: float) -> None:
     """LoadError where ``need`` bytes are more than ``most_gib``, or cannot come from ``there`` packed bytes on disk."""
     if need > most_gib * GIB:
-        why = f"the header asks for {need / GIB:.1f} GiB; allowed: {most_gib:g} GiB a volume (load.most_gib)"
+        asked = f"{need / GIB:{'.3g' if need < GIB else '.1f'}} GiB"
+        why = f"the header asks for {asked}; allowed: {most_gib:g} GiB a volume (load.most_gib)"
         raise unusable(what, f"{why}. Crop the scan, or raise the setting.")
     if packing in ("", "ascii"):
         return

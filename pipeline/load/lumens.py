@@ -3,22 +3,24 @@
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipeline.arrays.grids import LATTICE_VOXELS, lattice_mm
-from pipeline.load.curves import markups_in, of_json, positions_of
+from pipeline.load.curves import SYSTEMS, markups_in, of_json, positions_of, unit_of_markup
 from pipeline.load.geometry import Mask, Source, refused
 from pipeline.load.guard import reachable, read_text, told
 from pipeline.load.masks import read_mask
-from pipeline.load.outside import to_numbers
+from pipeline.load.outside import millimetres, to_numbers
+from pipeline.load.stated import stated_in_table
 from pipeline.load.surfaces import read_stl, read_vtp
-from pipeline.model import Branches, Shapes, Volume
+from pipeline.model import Array, Branches, Shapes, Volume
 
 
 def read_swc(path: Path) -> Branches:
-    """A .swc tree: number, type, x, y, z, radius, parent (-1 = root), lengths in mm."""
+    """A .swc tree: number, type, x, y, z, radius, parent (-1 = root), LPS mm unless a comment states another."""
+    lines = read_text(path).splitlines()
+    rows = [line.encode().split() for line in lines if line.strip() and not line.lstrip().startswith("#")]
     try:
-        lines = read_text(path).splitlines()
-        rows = [r.encode().split() for r in lines if r.strip() and not r.lstrip().startswith("#")]
         table = np.array([to_numbers(row) for row in rows])
     except ValueError:
         got = "a line that is not seven numbers"
@@ -27,14 +29,28 @@ def read_swc(path: Path) -> Branches:
         got = f"a table of shape {table.shape}"
         raise refused(path, got, "seven numbers a line", "export it again as .swc")
     reachable(path, table[:, :7], "numbers")
-    row_of = {int(n): i for i, n in enumerate(table[:, 0])}
-    child = np.array([i for i in range(len(table)) if int(table[i, 6]) in row_of], dtype=np.int64)
-    parent = np.array([row_of[int(table[i, 6])] for i in child], dtype=np.int64)
-    points, radius = table[:, 2:5], table[:, 5]
+    child, parent = _parents(path, table[:, 0], table[:, 6])
+    space, unit = stated_in_table(path, (), [line for line in lines if line.lstrip().startswith("#")])
+    factor = millimetres(path, unit or "mm")
+    points, radius = factor * table[:, 2:5] * SYSTEMS[space or "LPS"], factor * table[:, 5]
     if len(child) == 0 or not np.all(radius > 0):
         got = "no branch of positive radius"
         raise refused(path, got, "nodes with parents and radii", "check columns 6 and 7")
     return Branches(points[parent], points[child], radius[parent], radius[child])
+
+
+def _parents(path: Path, node: Array, parent: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Rows of the nodes that have a parent, and of these parents; LoadError where it is not one that the file holds."""
+    known, counts = np.unique(node, return_counts=True)
+    if np.any(counts > 1):
+        raise refused(path, f"node {known[counts > 1][0]:g} twice", "a number of its own for each", "number them anew")
+    held = np.isin(parent, node)
+    lost = ~held & (parent != -1)
+    if np.any(lost):
+        got = f"node {node[lost][0]:g} with the parent {parent[lost][0]:g}, which is none of the nodes"
+        raise refused(path, got, "a node's number, or -1 for a root", "export the whole tree again")
+    order = np.argsort(node)
+    return np.flatnonzero(held), order[np.searchsorted(node, parent[held], sorter=order)]
 
 
 def read_markups_branches(path: Path) -> Branches:
@@ -48,7 +64,8 @@ def read_markups_branches(path: Path) -> Branches:
             allowed = "a measurement named Radius with one of controlPointValues for every point"
             raise refused(path, f"curve {markup.get('name', '?')!r} without radii", allowed, "or give an .swc")
         with told(path):
-            radius = of_json(values)
+            unit = named["radius"].get("units") or unit_of_markup(markup)
+            radius = of_json(values) * millimetres(path, str(unit))
         if len(points) < 2 or not np.all(np.isfinite(points)) or not np.all((radius > 0) & np.isfinite(radius)):
             got = f"curve {markup.get('name', '?')!r} of {len(points)} points, radii {radius.tolist()[:4]}"
             raise refused(path, got, "two finite points or more, radii above 0", "correct the curve")

@@ -37,13 +37,14 @@ _SECOND = {
 
 
 def other_half(path: Path) -> Path:
-    """The .img of a .hdr, and the other way round; any other file is whole."""
+    """The .img of a .hdr, and the other way round, in capitals where that is; any other file is whole."""
     swap = {".hdr": ".img", ".img": ".hdr"}
-    return path.with_suffix(swap[path.suffix.lower()]) if path.suffix.lower() in swap else path
+    other = swap.get(path.suffix.lower(), path.suffix)
+    return path.with_suffix(other.upper() if path.suffix.isupper() else other)
 
 
-def head_of(path: Path) -> Head | None:
-    """What the header says; None for a pair without NIfTI's mark (Analyze); LoadError where it cannot be a scan."""
+def head_of(path: Path) -> Head:
+    """What the header says; LoadError where it cannot be a scan."""
     path_of_head = other_half(path) if path.suffix.lower() == ".img" else path
     packing = _packing(path_of_head)
     try:
@@ -52,10 +53,9 @@ def head_of(path: Path) -> Head | None:
     except (EOFError, OSError, ValueError):
         raise unusable(path, "cannot read its header: the packed data are damaged; copy the file again") from None
     fields = _fields(raw)
-    if fields is None and path.suffix.lower() in (".hdr", ".img"):
-        return None
     if fields is None:
-        raise unusable(path, "cannot read it as NIfTI: no header of NIfTI-1 or -2; check that the file is complete")
+        why = "cannot read it as NIfTI: no header of NIfTI-1 or -2 (Analyze does not say where its axes point)"
+        raise unusable(path, f"{why}; convert it, or check that the file is complete")
     whole = bytes(fields["magic"])[:2] == b"n+"
     count = int(fields["dim"][0])
     if not 1 <= count <= 7:

@@ -19,7 +19,16 @@ _SPACE_OF = re.compile(
     re.IGNORECASE,
 )
 """Any word that is given as the space: SPACE knows some."""
-_SPEAKS = re.compile(r"(?<![a-z])ras(?![a-z])|right[ _-]*anterior", re.IGNORECASE)
+_OTHER_UNITS = "|".join(name for name, mm in UNITS_MM.items() if mm != 1.0 and name != "in")
+_SPEAKS = {
+    of: re.compile(rf"(?<![a-z])(?:{pattern})", re.IGNORECASE)
+    for of, pattern in {
+        "RAS": r"ras(?![a-z])|right[ _-]*anterior",
+        "voxels": r"in[ \t]+(?:vox|pix)els?(?![a-z])|(?:vox|pix)els?[ _-]*(?:ind|coord|space|unit)|ijk(?![a-z])",
+        "a unit": rf"(?:in|is|are)[ \t]+(?:{_OTHER_UNITS})(?![a-zµμ])",
+    }.items()
+}
+"""What a line may speak of without stating it."""
 
 
 def stated_in(path: Path, kind: str) -> tuple[str, str]:
@@ -35,9 +44,9 @@ def stated_in(path: Path, kind: str) -> tuple[str, str]:
 
 
 def stated_in_table(path: Path, rows: Sequence[Sequence[str]], comments: Sequence[str]) -> tuple[str, str]:
-    """Space and unit by a table's comments, wherever they stand, else by the names of its columns (its first row).
+    """Space and unit by the comments of a table or tree, wherever they stand, else by names of columns (its first row).
 
-    LoadError where comments speak of RAS and do not state it: such a wire was taken for LPS.
+    LoadError where comments speak of RAS, voxels or another unit and do not state it: such a wire was taken for LPS mm.
     """
     names = {c.strip().lower() for c in rows[0]} if rows else set()
     default = ("LPS", "mm") if {"x_mm", "y_mm", "z_mm"} <= names else ("", "")
@@ -46,13 +55,27 @@ def stated_in_table(path: Path, rows: Sequence[Sequence[str]], comments: Sequenc
     other = next((name for name in map(named_space, spaces) if name not in ("LPS", "RAS")), None)
     if other:
         raise refused(path, f"space {other}", "LPS or RAS", "turn the wire's axes, and write '# space: LPS'")
-    spoken = next((line for line in (*comments, *sorted(names)) if _SPEAKS.search(line)), None)
-    if spoken and not spaces:
-        why = f"a line speaks of RAS ({spoken.strip()[:60]!r}), but the space is taken from '# space: RAS' alone"
-        raise unusable(path, f"{why}; write it so, or '# space: LPS' if that is what it is in")
+    if not spaces and (line := _spoken("RAS", (*comments, *sorted(names)))):
+        raise unusable(path, f"a line speaks of RAS ({line!r}), but {_taken('space: RAS', 'LPS')}")
+    if not units and not default[1] and (line := _spoken("a unit", comments)):
+        raise unusable(path, f"a line speaks of a unit ({line!r}), but {_taken('unit: m', 'mm')}")
+    if not spaces and not default[0] and (line := _spoken("voxels", comments)):
+        raise refused(path, f"a line that speaks of voxels ({line!r})", "LPS or RAS", "write mm, and '# space: LPS'")
     _require_known(path, [line for line in comments if not SPACE.search(line)])
     _require_one(path, spaces, units, default)
     return named_space(spaces[0]) if spaces else default[0], units[0] if units else default[1]
+
+
+def _spoken(of: str, lines: Sequence[str]) -> str:
+    """The first line that speaks of something; empty where none does."""
+    return next((line.strip()[:60] for line in lines if _SPEAKS[of].search(line)), "")
+
+
+def _taken(stated: str, usual: str) -> str:
+    """How a space or unit is stated, as by ``stated``. usual : what it is mostly."""
+    what = stated.partition(":")[0]
+    taken = f"the {what} is taken from '# {stated}' alone"
+    return f"{taken}; write it so, or '# {what}: {usual}' if that is what it is in"
 
 
 def _require_known(path: Path, comments: Sequence[str]) -> None:

@@ -2,7 +2,6 @@
 
 import functools
 import os
-import shutil
 import traceback
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -77,8 +76,8 @@ class Job:
         return digest((self.case, self.settings.config, given, self.until, code, ERRORS.columns, *named))
 
 
-def clear(folder: Path) -> None:
-    """Create a case's folder, or remove from it the files of an earlier result."""
+def clear(folder: Path) -> list[str]:
+    """Create a case's folder, or remove from it the files of an earlier result; names of what else lies among them."""
     with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
     for name in (ledger.FILE, *ledger.DATA, *ledger.PAGES):
@@ -87,8 +86,7 @@ def clear(folder: Path) -> None:
     with writing(folder):
         for path in folder.glob(".tmp-*"):  # of a run that was killed here: nobody else is at work in this folder
             path.unlink(missing_ok=True)
-    for name in ("view", "figures"):
-        shutil.rmtree(folder / name, ignore_errors=True)
+    return [name for part in (ledger.VIEW, ledger.FIGURES) for name in ledger.remove(folder / part)]
 
 
 def finished(job: Job, key: str) -> bool:
@@ -128,8 +126,10 @@ def run_case(job: Job) -> None:
         if again is None:
             _heal(job, progress)
             return
-        clear(job.folder)
+        kept = clear(job.folder)
         progress.start()
+        if kept:
+            progress.warn(f"not of a run, and left as it is: {listed(kept)}")
         if again:
             progress.warn(again)
         _compute(job, hashed, inputs, progress)
@@ -201,7 +201,7 @@ def _draw(job: Job, progress: CaseProgress) -> None:
 
 def draw(folder: Path, pages: ledger.Pages, cores: int = 1) -> None:
     """Draw the pages of a case anew, and record them."""
-    shutil.rmtree(folder / "figures", ignore_errors=True)
+    ledger.remove(folder / ledger.FIGURES)
     render_case(folder, pages == "embedded", each_on(cores))
     ledger.record_pages(folder, pages)
 

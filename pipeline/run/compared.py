@@ -15,6 +15,7 @@ from pipeline.run.overall import Found, damaged, found_cases, frames_in, golden_
 from reports.case_files import find_cases
 from reports.diff import diff_folders, not_judged
 from reports.origin import of_two_simulators, told_alike, what_differs
+from reports.records import run_records
 from reports.schema import SUMMARY
 from reports.simulators import folders_in
 from reports.tolerance import DEFAULT_TOLERANCE, RATIO, load_tolerance
@@ -34,7 +35,7 @@ def compared(first: Path, second: Path, tolerance: Path | None = None) -> Verdic
     for out in runs:
         if not is_folder(out):
             raise ValueError(f"{out}: no such folder; give one that `wireval run` wrote")
-    if not find_cases(second) and not any(second.glob("run*.json")):
+    if not find_cases(second) and not run_records(second):
         raise ValueError(f"{second}: no case below it: is this what `wireval run` wrote?")
     allowed = load_tolerance(tolerance or DEFAULT_TOLERANCE)
     old, new = map(folders_in, runs)

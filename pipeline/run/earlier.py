@@ -1,12 +1,15 @@
 """What earlier runs have left in an output folder and a new one removes: records, and cases of other manifests."""
 
+from collections.abc import Sequence
 from contextlib import suppress
 from glob import escape
 from pathlib import Path
 
+from pipeline.run import ledger
 from pipeline.run.case import clear
+from reports.atomic import writing
 from reports.case_files import left_over
-from reports.records import read_json
+from reports.records import read_json, run_records
 
 
 def remove_arrays(out: Path, name: str) -> None:
@@ -15,9 +18,10 @@ def remove_arrays(out: Path, name: str) -> None:
     name : of this run's record.
     """
     size = name.rpartition("-")[2]
-    for path in out.glob("run.*-*.json") if "-" in name else ():
-        if not path.name.endswith(f"-{size}"):
-            path.unlink(missing_ok=True)  # another shard may be at it, too
+    for path in run_records(out) if "-" in name else ():
+        if "-" in path.name and not path.name.endswith(f"-{size}"):
+            with writing(path):
+                path.unlink(missing_ok=True)  # another shard may be at it, too
 
 
 def remove_records(out: Path, manifest: str) -> None:
@@ -25,12 +29,28 @@ def remove_records(out: Path, manifest: str) -> None:
 
     And what is damaged, which would keep pages from being drawn.
     """
-    for path in out.glob("run*.json"):
+    for path in run_records(out):
         whose = ""
         with suppress(ValueError):
             whose = read_json(path).get("manifest_sha256", "")
         if whose != manifest:
-            path.unlink()
+            with writing(path):
+                path.unlink(missing_ok=True)
+
+
+def remove_over_all(out: Path, names: Sequence[str], *, ran: bool) -> None:
+    """Remove files over all cases, where runs have written them: ``ran``. A folder of such a name is refused."""
+    for path in (out / name for name in names):
+        if ran or path.is_dir():
+            with writing(path):
+                path.unlink(missing_ok=True)
+
+
+def _of_a_run(folder: Path) -> bool:
+    """Whether a run wrote the result in a case's folder: one of a crashed case has no ledger, and names the case."""
+    with suppress(ValueError):
+        return (folder / ledger.FILE).exists() or read_json(folder / ledger.RESULT).get("case") == folder.name
+    return False
 
 
 def remove_others(out: Path, manifest: str) -> None:
@@ -39,7 +59,7 @@ def remove_others(out: Path, manifest: str) -> None:
     manifest : SHA-256 of the manifest whose runs stay.
     """
     remove_records(out, manifest)
-    for folder in left_over(out):
+    for folder in filter(_of_a_run, left_over(out)):
         for place in (folder, *out.glob(f"sweep/*/cases/{escape(folder.name)}")):
             clear(place)
             (place / "log.txt").unlink(missing_ok=True)

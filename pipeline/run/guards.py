@@ -15,7 +15,7 @@ from pipeline.study.manifest import Case
 from pipeline.study.settings import Resolved
 from reports.case_files import find_cases
 from reports.origin import ABSENT, WIRES, settings_of
-from reports.records import read_json
+from reports.records import read_json, run_records
 
 WRITTEN = "cases", "sweep", "simulators", "figures"
 """Folders of an output in which a run writes, and removes what was there before."""
@@ -48,7 +48,7 @@ def guard_out(out: Path, manifest: Path, settings: Resolved) -> None:
     # a run that ended before its first file was whole leaves nothing but that file's temporary name
     if not out.exists() or all(path.name.startswith(".") for path in out.iterdir()):
         return
-    infos, wanted = sorted(out.glob("run*.json")), file_hash(manifest)
+    infos, wanted = run_records(out), file_hash(manifest)
     for info in infos:
         try:
             known = read_json(info).get("manifest_sha256")
@@ -110,7 +110,7 @@ def guard_score(scored: Mapping[str, tuple[Path, Sequence[Case]]], settings: Res
     do = "name another folder, or say --fresh (compute again)"
     for name, (out, cases) in scored.items():
         with suppress(ValueError):  # an unreadable result is replaced
-            for info in sorted(out.glob("run*.json")):
+            for info in run_records(out):
                 if changed := _changed(read_json(info), settings):
                     raise UsageError([f"{out} was scored with other settings: {changed}; {do}"])
         for case in cases:
@@ -131,7 +131,7 @@ def _wires_in(result: Mapping[str, Any]) -> set[Path]:
 def guard_stages(out: Path, until: Stage) -> None:
     """Refuse to replace finished results by results of fewer stages."""
     with suppress(ValueError):  # guard_out reports a damaged file
-        ends = [read_json(path).get("until", STAGES[-1]) for path in out.glob("run*.json")]
+        ends = [read_json(path).get("until", STAGES[-1]) for path in run_records(out)]
         later = [end for end in ends if end in STAGES and STAGES.index(end) > STAGES.index(until)]
         if later and any(out.glob("cases/*/result.json")):
             lost = f"{out} was run until {later[0]}, and --until {until} would take that away"

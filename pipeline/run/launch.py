@@ -2,6 +2,7 @@
 
 import gc
 import math
+import re
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager, suppress
@@ -15,7 +16,7 @@ from pipeline.run.aggregate import Totals, aggregate
 from pipeline.run.batch import elsewhere, run_all
 from pipeline.run.cache import Store, forget_lumen
 from pipeline.run.case import Job, clear, each_on, finished, run_case
-from pipeline.run.earlier import remove_arrays, remove_others, remove_records
+from pipeline.run.earlier import remove_arrays, remove_others, remove_over_all, remove_records
 from pipeline.run.gate import Gate
 from pipeline.run.hashing import file_hash
 from pipeline.run.inputs import stated
@@ -37,7 +38,7 @@ from reports.atomic import WriteError, remove_leftovers, write_text, writing
 from reports.case_files import counted, provenance_of
 from reports.doubts import AMONG
 from reports.gates import GATES
-from reports.records import read_json
+from reports.records import read_json, run_records
 from reports.run_page import render_index
 from reports.schema import FAILURES, OVERALL_FILE, SUMMARY, SWEEP, TIMINGS
 from reports.sweep import not_run
@@ -134,9 +135,9 @@ def chosen(cases: Sequence[Case], only: Sequence[str], shard: str) -> tuple[Case
 
 
 def _shard(text: str) -> tuple[int, int]:
-    parts = text.split("/")
-    if len(parts) == 2 and all(p.isascii() and p.isdigit() for p in parts) and 1 <= int(parts[0]) <= int(parts[1]):
-        return int(parts[0]), int(parts[1])
+    found = re.fullmatch(r"([0-9]{1,6})/([0-9]{1,6})", text)  # both are in the name of a file
+    if found and 1 <= int(found[1]) <= int(found[2]):
+        return int(found[1]), int(found[2])
     raise UsageError([f"--shard {text!r}: expected I/N with 1 <= I <= N, as in 3/20"])
 
 
@@ -168,18 +169,17 @@ def launch(plan: Plan) -> tuple[Totals, Path]:
     info |= {"to_score": {case.id: case.frames_to_score for case in plan.manifest.cases if case.frames_to_score}}
     info |= {"fail_if": [gate.text for gate in plan.gates]}
     name = f"run.{plan.shard.replace('/', '-')}.json" if plan.shard else "run.json"
-    remove_arrays(out, name)
     info |= {"left_out": _never_asked(out / name, plan.left_out), "config": settings.as_dict()}
+    swept, ran = (out / SWEEP.file).exists(), bool(run_records(out))
     try:
+        remove_arrays(out, name)
         write_json(out / name, info | {"cases": []})
         write_text(out / "config.resolved.toml", to_toml(settings))
         write_json(provenance_of(out / name), this_run())
+        remove_over_all(out, OVER_ALL, ran=ran)
     except WriteError as error:
         raise UsageError([str(error)]) from error
     remove_leftovers(out)
-    swept = (out / SWEEP.file).exists()
-    for earlier in OVER_ALL:
-        (out / earlier).unlink(missing_ok=True)
     if plan.template.fresh:
         remove_others(out, info["manifest_sha256"])
     elif not plan.shard and not plan.left_out:

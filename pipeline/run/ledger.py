@@ -6,15 +6,18 @@ case.
 """
 
 import hashlib
+import re
 import stat
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 from typing import Literal
 
 from pydantic import TypeAdapter
 
-from reports.atomic import write_bytes
+from reports.atomic import write_bytes, writing
+from reports.figures import declared
 from reports.records import ALWAYS, read_json
 from reports.schema import BUDGET, ENTRIES, ERRORS, POINTS, TIMINGS
 
@@ -24,6 +27,10 @@ SCORED = (RESULT, ERRORS.file, POINTS.file, FRAMES)
 """The files that numbers over many cases are computed from; traced wires are guesses of other insertions' ones."""
 DATA = (*SCORED, BUDGET.file, ENTRIES.file, TIMINGS.file, PROVENANCE)
 PAGES = ("report.html",)
+VIEW, FIGURES = "view", "figures"
+_IN_VIEW = re.compile(
+    r"scene\.mrml|lumen\.(?:seg\.nrrd|vtp|stl)|wire_(?:traced|simulated|true)(?:\.pvd|_\d+\.(?:vtp|mrk\.json))"
+)
 Pages = Literal["", "linked", "embedded"]
 """Which pages a case has: none, ones with links to their pictures, ones with the pictures inside."""
 
@@ -82,7 +89,7 @@ LEDGER = TypeAdapter(Ledger)
 
 def is_page(name: str) -> bool:
     """Whether a file is a page or belongs to one: it is drawn from the data files."""
-    return name in PAGES or name.startswith("figures/")
+    return name in PAGES or name.startswith(f"{FIGURES}/")
 
 
 def entry_of(path: Path) -> Entry:
@@ -119,5 +126,34 @@ def _write(folder: Path, ledger: Ledger) -> None:
 
 def _found(folder: Path) -> Iterator[str]:
     yield from (name for name in (*DATA, *PAGES) if (folder / name).is_file())
-    for part in ("view", "figures"):
-        yield from sorted(f"{part}/{p.name}" for p in (folder / part).glob("[!.]*") if p.is_file())
+    for part in (VIEW, FIGURES):
+        yield from sorted(f"{part}/{p.name}" for p in (folder / part).glob("*") if _is_ours(p) and p.is_file())
+
+
+def remove(place: Path) -> list[str]:
+    """Remove from a case's ``view`` or ``figures`` what runs write there, and the folder; names of what else is in it.
+
+    3D Slicer saves what a user corrects beside what it has opened.
+    """
+    if not place.is_dir():
+        return []
+    with writing(place):
+        there = sorted(place.iterdir())
+        kept = [path for path in there if path.is_dir() or not (_is_ours(path) or path.name.startswith(".tmp-"))]
+        for path in there:
+            if path not in kept:
+                path.unlink(missing_ok=True)
+        if not kept:
+            place.rmdir()
+    return [f"{place.name}/{path.name}" for path in kept]
+
+
+def _is_ours(path: Path) -> bool:
+    """Whether a file in ``view`` or ``figures`` has a name that runs give."""
+    return bool(_IN_VIEW.fullmatch(path.name)) if path.parent.name == VIEW else path.name in _drawings()
+
+
+@cache
+def _drawings() -> frozenset[str]:
+    """Names of the pictures of a case's page, and of their numbers."""
+    return frozenset(f"{entry['figure']}{end}" for entry in declared("case") for end in (".png", ".csv"))

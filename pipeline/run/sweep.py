@@ -19,7 +19,7 @@ from pipeline.study.settings import Resolved, Setting, SettingsError, parse_assi
 from reports import tables
 from reports.case_files import listed
 from reports.origin import why_not_pooled
-from reports.records import read_json
+from reports.records import read_json, run_records
 from reports.schema import SWEEP
 from reports.sweep import UNCHANGED, folder_of
 
@@ -79,7 +79,7 @@ def heads_of(plain: Resolved, cases: Sequence[Case], points: Sequence[SweepPoint
 def found_heads(out: Path) -> list[Head]:
     """The points that the runs into an output folder name; ``unchanged`` is empty where shards differ in it."""
     found: dict[tuple[str, str], Head] = {}
-    for path in sorted(out.glob("run*.json")):
+    for path in run_records(out):
         for head in read_json(path).get("sweep", ()):
             before = found.setdefault((head["parameter"], head["value"]), head)
             if before["unchanged"] != head["unchanged"]:

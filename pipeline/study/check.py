@@ -104,6 +104,9 @@ def _absent(case: Case) -> Iterator[tuple[Path, str]]:
     for path in dict.fromkeys(files_of(case).values()):
         try:
             if status_of(path) is None:
+                if path.is_symlink():
+                    yield path, f"{path}: a link to nothing ({path.readlink()}); name the file itself"
+                    continue
                 what = "matches no file" if is_pattern(path.name) else "no such file or folder"
                 near = nearest(path.name, [beside.name for beside in islice(path.parent.glob("*"), MOST_BESIDE)])
                 yield path, f"{path}: {what}" + f"; did you mean {near!r}?" * bool(near)

@@ -7,7 +7,7 @@ from contextlib import suppress
 from itertools import combinations, pairwise
 from pathlib import Path
 
-from pipeline.load import LoadError, Source
+from pipeline.load import LoadError, Source, parts_of
 from pipeline.load.guard import size_of
 from pipeline.study.manifest import Case
 
@@ -39,28 +39,32 @@ def _copies(case: Case) -> Iterator[str]:
 
 
 def _of_one_content(paths: Iterable[Path]) -> Iterator[tuple[Path, Path]]:
-    """Pairs of regular files with the same content; of several the first with each of the others."""
-    alike: dict[tuple[int, bytes], list[Path]] = defaultdict(list)
+    """Pairs of regular files with the same content, their voxels beside them included: the headers of NIfTI pairs are
+    all alike. Of several the first with each of the others.
+    """
+    alike: dict[object, list[tuple[Path, ...]]] = defaultdict(list)
     for path in paths:
         with suppress(LoadError, OSError):  # a folder, or what cannot be read: the reader says so
-            size = size_of(path)
-            alike[size, _sample(path, size)].append(path)
+            files = (path, *parts_of(path))
+            alike[tuple(map(_sample, files))].append(files)
     found: set[Path] = set()
     for group in alike.values():
-        for first, second in combinations(group, 2):
-            if not {first, second} & found and filecmp.cmp(first, second, shallow=False):
-                found.add(second)
-                yield first, second
+        for one, other in combinations(group, 2):
+            same = (filecmp.cmp(*pair, shallow=False) for pair in zip(one, other, strict=True))
+            if not {one[0], other[0]} & found and all(same):
+                found.add(other[0])
+                yield one[0], other[0]
 
 
-def _sample(path: Path, size: int) -> bytes:
-    """A few short pieces of a file, evenly through it, which tell two scans apart without reading them."""
+def _sample(path: Path) -> tuple[int, bytes]:
+    """Bytes of a file, and a few short pieces, evenly through it, which tell two scans apart without reading them."""
+    size = size_of(path)
     with path.open("rb") as file:
         pieces = []
         for n in range(SAMPLES):
             file.seek(max(0, size - SAMPLE_BYTES) * n // (SAMPLES - 1))
             pieces.append(file.read(SAMPLE_BYTES))
-    return b"".join(pieces)
+    return size, b"".join(pieces)
 
 
 def shared(cases: Sequence[Case]) -> list[str]:

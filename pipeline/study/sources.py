@@ -2,13 +2,14 @@
 
 import itertools
 import os
+import stat
 from pathlib import Path
 from typing import Annotated, Any
 
 from pydantic import BeforeValidator, ValidationInfo, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
-from pipeline.load import Source
+from pipeline.load import Source, hdf5
 from pipeline.load.geometry import LoadError, Mask
 from pipeline.load.guard import read_toml, status_of
 from pipeline.load.order import in_order
@@ -25,7 +26,19 @@ def _source(value: Any, info: ValidationInfo) -> Source:
         raise PydanticCustomError("name", "no name")
     name, _, dataset = value.partition("#")
     _require_name(name, info)
-    return Source(Path((info.context or {}).get("folder", "")) / name, dataset)
+    path = Path((info.context or {}).get("folder", "")) / name
+    if "#" in value and os.path.lexists(f"{path}#{dataset}"):
+        raise saying(f"{info.field_name} = {value!r}: a # parts a file's name from that of a dataset; rename the file")
+    return Source(path, _dataset(path, dataset, info))
+
+
+def _dataset(path: Path, name: str, info: ValidationInfo) -> str:
+    """The name of a dataset or series; an error where a file holds none of such, which would be read as a whole."""
+    held = status_of(path) if name and not hdf5.recognises(path) else None
+    if held and stat.S_ISREG(held.st_mode):
+        allowed = "study.h5#/frames, or FOLDER#SERIES_UID of DICOM slices"
+        raise saying(f"{info.field_name} = '{path.name}#{name}': this file holds no datasets; allowed: {allowed}")
+    return name
 
 
 def _require_name(name: str, info: ValidationInfo) -> None:
@@ -62,7 +75,7 @@ def _sources(value: Any, info: ValidationInfo) -> tuple[Source, ...]:
         return (source,)
     if len(found) > MOST_MATCHES:
         raise saying(f"{info.field_name} = {value!r} matches more than {MOST_MATCHES} files; make it narrower")
-    return tuple(Source(path, source.dataset) for path in found)
+    return tuple(Source(path, _dataset(path, source.dataset, info)) for path in found)
 
 
 def is_pattern(name: str) -> bool:

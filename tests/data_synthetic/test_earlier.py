@@ -69,14 +69,36 @@ def test_a_file_that_would_be_read_as_a_frame_is_refused_and_all_stays(
     assert files(tmp_path) == there
 
 
-def test_frames_without_a_manifest_are_not_ours(longer: Study, shorter: Study, tmp_path: Path) -> None:
-    """As a run that was interrupted leaves them: written over where they are meant again, refused beyond."""
-    write_study(longer, tmp_path)
-    (tmp_path / "manifest.toml").unlink()
-    assert earlier_files(tmp_path) == []
-    assert in_the_way(tmp_path, "mha", 3) == []
-    (said,) = in_the_way(tmp_path, "mha", 1)
-    assert "frame_001.mha" in said
+def test_a_study_that_was_interrupted_is_ours(longer: Study, shorter: Study, tmp_path: Path) -> None:
+    def interrupt(done: int, _frames: int) -> None:
+        if done == 2:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        write_study(longer, tmp_path, progress=interrupt)
+    assert len(earlier_files(tmp_path)) == 5
+    write_study(shorter, tmp_path)
+    assert len(files(tmp_path)) == 4
+
+
+@pytest.mark.parametrize("format", ["mha", "h5"])
+def test_scans_without_a_manifest_of_ours_are_overwritten_only_if_asked_for(
+    shorter: Study, tmp_path: Path, format: str
+) -> None:
+    """A user's own reference.mha, frames/frame_000.mha and truth.json were gone, with exit code 0."""
+    write_study(shorter, tmp_path, format)
+    written = files(tmp_path)
+    for name in written:
+        (tmp_path / name).unlink()
+    for name in written.keys() - {"manifest.toml"}:
+        (tmp_path / name).write_text("mine", encoding="utf-8")
+        with pytest.raises(ValueError, match=f"{name}: is in no study that synth wrote; .* or --fresh"):
+            write_study(shorter, tmp_path, format)
+        assert (tmp_path / name).read_text(encoding="utf-8") == "mine"
+        (tmp_path / name).unlink()
+    (tmp_path / "truth.json").write_text("mine", encoding="utf-8")
+    write_study(shorter, tmp_path, format, fresh=True)
+    assert files(tmp_path).keys() == written.keys()
 
 
 @pytest.mark.parametrize(

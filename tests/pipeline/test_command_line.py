@@ -103,6 +103,8 @@ TOO_LONG = (
         ("run", "missing: MANIFEST, -o; wireval run --help lists what there is"),
         ("run STUDY -o", "-o: its value is missing"),
         ("cache --limit -1G", "--limit: its value is missing (one that begins with - is written --limit=-VALUE)"),
+        (f"cache --limit {'9' * 400}G", "expected a size with its unit, as in 20G or 500M"),
+        (f"run STUDY -o y --shard 1/{'9' * 400}", "expected I/N with 1 <= I <= N, as in 3/20"),
         ("run STUDY -o EMPTY", "an empty argument"),
         ("run STUDY -o y -j x", "-j 'x': expected a whole number"),
         ("run STUDY -o y --case-timeout 1m", "--case-timeout '1m': expected a number of seconds, as 60"),

@@ -209,12 +209,15 @@ def test_a_truth_is_of_numbers_and_stands_once(tmp_path: Path, text: str, said: 
     ("name", "text", "said"),
     [
         ("a.swc", "1 1 0 0 0 1 -1\n2 1 0 0 1_0 1 1\n", "a line that is not seven numbers"),
+        ("a.swc", "1 1 0 0 0 1 -1\n2 1 0 0 3 1 1\n2 1 0 0 6 1 2\n", "got node 2 twice"),
+        ("a.swc", "1 1 0 0 0 1 -1\n2 1 0 0 3 1 1\n3 1 0 0 6 1 99\n", "the parent 99, which is none of the nodes"),
+        ("a.swc", "1 1 0 0 0 1 -1\n2 1 0 0 3 1 1\n3 1 0 0 6 1 1.9\n", "the parent 1.9, which is none"),
         ("a.stl", "solid\nvertex 0 0 0\nvertex 1_0 0 0\nvertex 0 1 0\n", "a vertex that is not three numbers"),
         ("a.mrk.json", "[1, true]", "contradicts its format"),
     ],
 )
 def test_a_lumen_is_of_plain_digits(tmp_path: Path, name: str, text: str, said: str) -> None:
-    """1_0 was 10, and true a radius of 1 mm."""
+    """1_0 was 10, and true a radius of 1 mm; a vessel whose parent is missing was cut off there."""
     path = tmp_path / name
     if name.endswith(".json"):
         radii = {"name": "Radius", "controlPointValues": json.loads(text)}

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import pydicom
 import pytest
 
-from pipeline.load import LoadError, foreign, load, read_header
+from pipeline.load import LoadError, load, read_header
 from tests.studies.formats import Variant, outcome, variants
 
 VARIANTS = variants()
@@ -35,15 +34,3 @@ def test_files_of_others_are_read_or_refused_in_a_sentence(path: Path) -> None:
         assert path.name in str(error)  # noqa: PT017
     else:
         assert min(volume.shape) >= 2
-
-
-@pytest.mark.parametrize("kind", ["16-bit complex", "128-bit float", "vector of 8-bit unsigned integer", "label"])
-def test_what_itk_reads_holds_grey_values(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str) -> None:
-    said = {"size": [2, 3, 4], "spacing": [1, 1, 1], "origin": [0, 0, 0], "direction": [1, 0, 0, 0, 1, 0, 0, 0, 1]}
-
-    def asked(*_: object) -> str:
-        return json.dumps(said | {"channels": 1, "kind": kind})
-
-    monkeypatch.setattr(foreign, "_asked", asked)
-    with pytest.raises(LoadError, match=f"voxels of {kind}; allowed: grey values"):
-        foreign.head_of(tmp_path / "a.gipl")

@@ -23,6 +23,7 @@ from pipeline.run.store import digest
 from pipeline.study.first_wire import AT_EDGE, IN_PLACE, MOVED_IN, infer_entry
 from pipeline.study.infer import _deeper, _order, _scans_in, infer_manifest
 from pipeline.study.manifest import ManifestError, read_manifest
+from pipeline.study.same_scans import repeated
 from tests.pipeline.test_load import SPACING, image_of, numbered
 from tests.pipeline.test_manifest import GOOD
 from tests.studies.formats import variants
@@ -96,6 +97,17 @@ def test_datasets_labels_and_levels_belong_to_keys(tmp_path: Path) -> None:
         Mask(path, "/frames", label=label, level=level) for label, level in ((1, None), ("a", None), (None, 0.5))
     ]
     assert len({digest(source) for source in sources}) == len(sources)
+
+
+def test_frames_whose_headers_are_alike_are_one_scan_only_where_their_voxels_are(tmp_path: Path) -> None:
+    """The header of a NIfTI pair names no file: of one grid, all frames but the first were refused as copies."""
+    (tmp_path / "frames").mkdir()
+    for name, values in (("a", numbered()), ("b", numbered() + 1), ("c", numbered())):
+        sitk.WriteImage(image_of(values), str(tmp_path / "frames" / f"{name}.hdr"))
+    (tmp_path / "m.toml").write_text(GOOD.replace("frames/*.mha", "frames/*.hdr"), encoding="utf-8")
+    assert [text.split(": ")[0] for text in repeated(read_manifest(tmp_path / "m.toml").cases[0])] == [
+        str(tmp_path / "frames" / "c.hdr")
+    ]
 
 
 def test_natural_order_over_whole_paths(tmp_path: Path) -> None:

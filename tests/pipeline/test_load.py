@@ -137,6 +137,27 @@ def test_files_that_hold_a_headers_voxels_are_part_of_it(tmp_path: Path) -> None
         assert file_hash(tmp_path / name) != before
 
 
+def test_a_folder_of_scans_is_told_how_to_be_named(tmp_path: Path) -> None:
+    sitk.WriteImage(image_of(numbered()), str(tmp_path / "f_2.nii.gz"))
+    with pytest.raises(LoadError, match=rf"holds scans, as f_2.nii.gz; name these, as in {tmp_path.name}/\*\.nii\.gz"):
+        read_header(tmp_path)
+
+
+def test_a_small_scan_is_told_how_small_the_setting_is(tmp_path: Path) -> None:
+    """ "asks for 0.0 GiB; allowed: 1e-09"."""
+    sitk.WriteImage(image_of(numbered()), str(tmp_path / "a.mha"))
+    with pytest.raises(LoadError, match=r"asks for [1-9.]+e-0\d GiB; allowed: 1e-09 GiB"):
+        read_header(tmp_path / "a.mha", LoadConfig(most_gib=1e-9))
+
+
+def test_a_pair_in_capitals_is_a_pair(tmp_path: Path) -> None:
+    sitk.WriteImage(image_of(numbered()), str(tmp_path / "a.hdr"), useCompression=False)
+    header, voxels = ((tmp_path / f"a{end}").rename(tmp_path / f"A{end.upper()}") for end in (".hdr", ".img"))
+    for path, other in ((header, voxels), (voxels, header)):
+        np.testing.assert_array_equal(load(read_header(path)).values, numbered())
+        assert file_parts(path) == (other,)
+
+
 def test_a_key_opens_no_header_of_a_series(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Every frame and every point of a sweep asks for the hash of its folder."""
     for name in ("a.dcm", "b"):

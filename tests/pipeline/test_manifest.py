@@ -16,6 +16,7 @@ from pipeline.load import Header, LoadError, Source, read_header
 from pipeline.load.curves import read_truth
 from pipeline.model import Array
 from pipeline.ranges import Name
+from pipeline.study.check import check
 from pipeline.study.devices import implausible
 from pipeline.study.manifest import ManifestError, read_manifest
 from pipeline.study.plausible import (
@@ -125,6 +126,28 @@ def test_all_problems_of_a_whole_case_come_at_once(tmp_path: Path) -> None:
     found = problems(tmp_path, text)
     for part in ("down is missing", "no more than the wire's 0.18", "deeper than the wire, 8"):
         assert part in found
+
+
+@pytest.mark.parametrize("name", ["frames/f_1.mha", "frames/*_1.mha"])
+def test_a_dataset_of_a_file_that_has_none_is_refused(tmp_path: Path, name: str) -> None:
+    """It was dropped, and the file read as a whole."""
+    said = "frames = 'f_1.mha#/x': this file holds no datasets; allowed: study.h5#/frames"
+    assert said in problems(tmp_path, GOOD.replace("frames/*.mha", f"{name}#/x"))
+
+
+def test_a_hash_in_a_name_is_told_for_what_it_is(tmp_path: Path) -> None:
+    """ "no such file: f" was said of f#1.mha."""
+    (tmp_path / "f#1.mha").touch()
+    said = problems(tmp_path, GOOD.replace("frames/*.mha", "f#1.mha"))
+    assert "frames = 'f#1.mha': a # parts a file's name from that of a dataset; rename the file" in said
+
+
+def test_a_link_to_nothing_is_called_so(tmp_path: Path) -> None:
+    """It was asked whether this very name was meant."""
+    (tmp_path / "gone.mha").symlink_to("elsewhere.mha")
+    path = written(tmp_path, GOOD.replace("frames/*.mha", "gone.mha"))
+    (said,) = [text for text in check(read_manifest(path).cases, Config()) if "gone.mha" in text]
+    assert f"{tmp_path / 'gone.mha'}: a link to nothing (elsewhere.mha); name the file itself" in said
 
 
 def test_ids_are_unique(tmp_path: Path) -> None:

@@ -367,6 +367,62 @@ def test_report_heals_pages(study: Path, whole: Path, out: Path) -> None:
     assert differences(whole, out) == []
 
 
+def test_a_case_whose_run_goes_on_is_missing_for_the_exit_code_too(
+    out: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """ "1 case without a result" was printed, and a run that ended while pages were drawn made it exit 0."""
+    info = json.loads((out / "run.json").read_text(encoding="utf-8"))
+    (out / "run.json").write_text(json.dumps(info | {"planned": ["bifurcation", "late"]}), encoding="utf-8")
+
+    def drawn(*_: object) -> bool:
+        shutil.copytree(case_of(out), out / "cases" / "late")
+        return True
+
+    monkeypatch.setattr("pipeline.commands.report._all_drawn", drawn)
+    assert main(["report", str(out)]) == 1
+    assert "1 case without a result" in capsys.readouterr().out
+
+
+def test_an_output_that_is_removed_is_told_for_gone(tmp_path: Path) -> None:
+    """ "make room or allow writing there" was said of it."""
+    with pytest.raises(atomic.WriteError, match="its folder is gone: leave it in its place"), atomic.writing(tmp_path):
+        (tmp_path / "gone" / "log.txt").open("a", encoding="utf-8")
+
+
+def test_files_of_a_users_own_stay_among_those_of_a_run(
+    study: Path, out: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """3D Slicer saves corrected curves in ``view``: a run after one scan was changed removed them, as --resume did
+    with run_notes.json; with it no page was drawn, since it was no record of a run.
+    """
+    own = [case_of(out) / "view" / "corrected_000.mrk.json", case_of(out) / "figures" / "mine.svg"]
+    others = [out / "run_notes.json", out / "run.mine-2.json", out / "cases" / "mine" / "result.json"]
+    for path in (*own, *others):
+        path.parent.mkdir(exist_ok=True)
+        path.write_text('{"my": 1}', encoding="utf-8")
+    assert main(["report", str(out)]) == 0
+    ours = ledger.read(case_of(out))
+    assert ours is not None
+    assert not {"view/corrected_000.mrk.json", "figures/mine.svg"} & ours.files.keys()
+    capsys.readouterr()
+    assert run(study, out, "--fresh", "--until", "load") == 0
+    assert "not of a run, and left as it is: view/corrected_000.mrk.json, figures/mine.svg" in capsys.readouterr().err
+    assert [*own[1].parent.iterdir()] == [own[1]]
+    assert not (own[0].parent / "wire_traced_000.vtp").exists()
+    assert {path.read_text(encoding="utf-8") for path in (*own, *others)} == {'{"my": 1}'}
+
+
+@pytest.mark.parametrize("name", ["summary.csv", "run_dir.json"])
+def test_a_folder_where_a_run_writes_is_named_before_anything_is_run(
+    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str
+) -> None:
+    (tmp_path / name).mkdir()
+    assert run(study, tmp_path, "--resume", "--until", "load") == (2 if name == "summary.csv" else 0)
+    said = f"{tmp_path / name}: cannot be written: Is a directory; remove this folder"
+    assert (said in capsys.readouterr().err) == (name == "summary.csv")
+    assert (tmp_path / name).is_dir()
+
+
 def test_leftovers_of_the_dead_go_and_those_of_the_living_stay(study: Path, whole: Path, out: Path) -> None:
     dead, living = (out / f".tmp-{atomic.HOST}-{n}-0123abcd-run.json" for n in (2**22 + 1, os.getppid()))
     inside = case_of(out) / f".tmp-{atomic.HOST}-1-0123abcd-errors.csv"

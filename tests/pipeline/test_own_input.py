@@ -6,12 +6,15 @@ import json
 import os
 import re
 import struct
+import tracemalloc
 from collections.abc import Callable
+from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
 import pytest
 import SimpleITK as sitk
+from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 from skimage.measure import marching_cubes
 
@@ -22,7 +25,7 @@ from pipeline.load.lumens import read_lumen
 from pipeline.load.masks import mask_header
 from pipeline.load.views import read_views
 from pipeline.load.wires import read_wires
-from pipeline.model import Shapes
+from pipeline.model import Branches, Shapes
 from pipeline.segment.config import SegmentConfig
 from pipeline.segment.given import given_lumen
 from pipeline.status import InputError
@@ -31,7 +34,7 @@ from pipeline.study.parameters import read_parameters
 from pipeline.study.settings import SettingsError, parse_assignment, read_settings
 from reports.export import write_markups_curve, write_polyline_vtp, write_surface_vtp
 from reports.records import read_json
-from reports.texts import UnreadableError
+from reports.texts import UnreadableError, read_bytes
 from reports.tolerance import load_tolerance
 from tests.fuzz.inputs import markups, stl, tetrahedra, vtp
 
@@ -335,6 +338,68 @@ def test_what_speaks_of_ras_and_does_not_state_it_is_refused(tmp_path: Path, lin
             read_curve(tmp_path / "a.csv")
         with pytest.raises(LoadError, match=said):
             read_wires([Source(tmp_path / "a.csv")], 1)
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("# units are metres", "a line speaks of a unit"),
+        ("# in cm", "a line speaks of a unit"),
+        ("# values are in mm", ""),
+        ("# made in mania", ""),
+        ("# voxel indices", "a line that speaks of voxels"),
+        ("# counted in voxels", "a line that speaks of voxels"),
+        ("# voxel size 0.4 mm", ""),
+    ],
+)
+def test_a_table_without_units_that_speaks_of_some_is_refused(tmp_path: Path, line: str, said: str) -> None:
+    """Metres and voxels were taken for LPS mm; columns x_mm, y_mm, z_mm say what they are."""
+    (tmp_path / "a.csv").write_text(f"{line}\nx,y,z\n1,2,3\n4,5,6\n", encoding="utf-8")
+    with pytest.raises(LoadError, match=said) if said else nullcontext():
+        read_curve(tmp_path / "a.csv")
+    (tmp_path / "b.csv").write_text(f"{line}\nx_mm,y_mm,z_mm\n1,2,3\n4,5,6\n", encoding="utf-8")
+    assert len(read_curve(tmp_path / "b.csv").points_mm) == 2
+
+
+@pytest.mark.parametrize(
+    ("comment", "factors"), [("# space: RAS", (-1, -1, 1, 1)), ("# unit: cm", (10, 10, 10, 10)), ("# of a liver", 1)]
+)
+def test_a_tree_says_its_space_and_unit(tmp_path: Path, comment: str, factors: ArrayLike) -> None:
+    """A vessel in RAS was read as LPS, and frames were ok in its mirror image."""
+    (tmp_path / "a.swc").write_text(f"{comment}\n3 1 1 2 3 0.5 -1\n1 1 4 5 6 0.4 3\n", encoding="utf-8")
+    lumen = read_lumen(tmp_path / "a.swc", 1)
+    assert isinstance(lumen, Branches)
+    found = [*lumen.start_mm[0], lumen.start_radius_mm[0]], [*lumen.end_mm[0], lumen.end_radius_mm[0]]
+    np.testing.assert_allclose(found, np.array([[1, 2, 3, 0.5], [4, 5, 6, 0.4]]) * factors)
+
+
+@pytest.mark.parametrize(("stated", "of_radii", "factor"), [("cm", "cm", 10), ("cm", "", 10), ("mm", "cm", 1)])
+def test_radii_are_in_the_unit_that_is_stated(tmp_path: Path, stated: str, of_radii: str, factor: float) -> None:
+    """Positions in cm were scaled and radii left as they were."""
+    points = [{"position": [0, 0, z]} for z in (0, 5)]
+    radii = {"name": "Radius", "units": of_radii, "controlPointValues": [0.2, 0.3]}
+    markup = {"type": "Curve", "coordinateUnits": stated, "controlPoints": points, "measurements": [radii]}
+    (tmp_path / "a.mrk.json").write_text(json.dumps({"markups": [markup]}), encoding="utf-8")
+    lumen = read_lumen(tmp_path / "a.mrk.json", 1)
+    assert isinstance(lumen, Branches)
+    assert (lumen.end_mm[0, 2], lumen.end_radius_mm[0]) == (5 * factor, 3.0)
+
+
+@pytest.mark.parametrize("kind", ["ClosedCurve", "Plane", "Angle", "ROI"])
+def test_a_markup_that_is_no_open_curve_is_no_wire(tmp_path: Path, kind: str) -> None:
+    points = [{"position": [0, 0, z]} for z in range(4)]
+    (tmp_path / "a.mrk.json").write_text(json.dumps({"markups": [{"type": kind, "controlPoints": points}]}))
+    with pytest.raises(LoadError, match=f"a markup of type '{kind}'"):
+        read_curve(tmp_path / "a.mrk.json")
+
+
+def test_a_small_file_takes_no_memory_for_the_longest(tmp_path: Path) -> None:
+    """Of a file of three bytes 256 MiB were asked for, a MemoryError under a limit of memory."""
+    (tmp_path / "a").write_bytes(b"abc")
+    tracemalloc.start()
+    assert read_bytes(tmp_path / "a", 2**26) == b"abc"
+    assert tracemalloc.get_traced_memory()[1] < 2**20
+    tracemalloc.stop()
 
 
 def test_one_table_of_all_frames_is_told_how_to_be_split(tmp_path: Path) -> None:

@@ -42,6 +42,15 @@ def test_links_that_lead_out_are_refused(tmp_path: Path, capsys: object) -> None
     assert list(elsewhere.iterdir()) == []
 
 
+def test_a_folder_that_a_run_writes_into_is_no_link(tmp_path: Path) -> None:
+    """Pictures were drawn, and removed, in the folder of the user's own that it led to."""
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "cases" / "a").mkdir(parents=True)
+    (tmp_path / "cases" / "a" / "figures").symlink_to(tmp_path / "mine")
+    (told,) = misleading_links(tmp_path)
+    assert f"folders that runs write into are links: {tmp_path / 'cases' / 'a' / 'figures'} -> " in told
+
+
 def test_a_case_that_is_a_link_to_another_is_refused(tmp_path: Path) -> None:
     """It would be pooled twice, under two names; what it held itself is gone."""
     (tmp_path / "cases" / "b").mkdir(parents=True)

@@ -1,4 +1,4 @@
-"""The scan in formats that ITK alone reads, and files that are no scan."""
+"""The scan in formats that ITK reads and wireval does not, and files that are no scan."""
 
 from __future__ import annotations
 
@@ -15,8 +15,9 @@ FULL = False
 
 
 def other_variants() -> Iterator[Variant]:
-    yield Variant("gipl, by ITK", by_itk("a.gipl", turn=np.eye(3)), "ITK", direction=np.eye(3))
-    yield Variant("vtk, by ITK", by_itk("a.vtk", turn=np.eye(3)), "ITK", direction=np.eye(3))
+    for suffix in ("gipl", "vtk", "img.gz", "spr"):
+        yield Variant(f"{suffix}, by ITK", by_itk(f"a.{suffix}", turn=np.eye(3)), "!none of the formats allowed")
+    yield Variant("hdr, Analyze", analyze, "!Analyze")
     yield Variant("a text", lambda f: _text(f / "a.txt"), "!cannot read")
     yield Variant("a text called .mha", lambda f: _text(f / "a.mha"), "!cannot read")
     yield Variant("a text called .nrrd", lambda f: _text(f / "a.nrrd"), "!cannot read")
@@ -31,6 +32,13 @@ def other_variants() -> Iterator[Variant]:
 
 def _text(path: Path, text: str = "hello, this is no scan\n") -> Path:
     path.write_text(text, encoding="utf-8")
+    return path
+
+
+def analyze(folder: Path) -> Path:
+    """A pair without NIfTI's mark."""
+    path = by_itk("a.hdr")(folder)
+    path.write_bytes(path.read_bytes()[:344] + bytes(4))
     return path
 
 
