@@ -34,7 +34,7 @@ def verdict(statistics: Mapping[str, Any], simulator: str = "", doubt: Doubt = N
     sentence += f" From the true wire it lies {true} mm." * (true != NOTHING)
     sentence += _at_the_floor(statistics) + _beyond_inputs(statistics)
     again = f"But {TWINS} that was scanned again, and count as several: see the warnings." * bool(doubt.twins)
-    judged = _warned(doubt), tips_off(statistics), _against(statistics), _unknown_roll(statistics, simulator)
+    judged = _warned(doubt), tips_off(statistics), _against(statistics), _unknown_roll(statistics, simulator, doubt)
     return " ".join(filter(None, (sentence, *judged, again)))
 
 
@@ -103,13 +103,18 @@ WORSE_BELOW = -0.1
 """Skill without an interval below which a wire is worse than its rival: an rms 5 % above that one's."""
 
 
-def remarks(statistics: Mapping[str, Any], simulator: str = "") -> list[str]:
-    """What rms_mm and skill alone do not show, one sentence each. simulator : as in :func:`verdict`."""
-    return [text for text in (tips_off(statistics), _unknown_roll(statistics, simulator)) if text]
+def remarks(statistics: Mapping[str, Any], simulator: str = "", doubt: Doubt = NO_DOUBT) -> list[str]:
+    """What rms_mm and skill alone do not show, one sentence each. simulator, doubt : as in :func:`verdict`."""
+    return [text for text in (tips_off(statistics), _unknown_roll(statistics, simulator, doubt)) if text]
 
 
-def _unknown_roll(statistics: Mapping[str, Any], simulator: str) -> str:
-    """That a roll which is stated does worse than none, where the wire is no better than a guess."""
+def _unknown_roll(statistics: Mapping[str, Any], simulator: str, doubt: Doubt) -> str:
+    """That a roll which is stated does worse than none, where the wire is no better than a guess.
+
+    Not of traces that lie off the scans: a roll that is fitted to these hides it.
+    """
+    if doubt.off_the_scans:
+        return ""
     rms, unknown = (_number(statistics.get(key)) for key in ("rms_mm", "null_roll_unknown_rms_mm"))
     if not _skill(statistics)[1] <= 0.0 or not unknown < FAR_BELOW * rms:
         return ""

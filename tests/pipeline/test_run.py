@@ -600,6 +600,7 @@ def test_own_curves_are_held_against_the_wires_that_are_seen(study: Path, finish
     (text,) = said[1]
     assert "frame 0: " in text
     assert "mm longer" in text
+    assert "roll" not in " ".join(result["warnings"]), "it was said of the roll, fitted to which these curves were met"
 
 
 def test_results_do_not_depend_on_workers_or_shards(short: Path, tmp_path: Path) -> None:

@@ -7,8 +7,8 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from reports.doubts import Doubt, weightiest_first
-from reports.verdict import badge, in_short, of_these_alone, unscored, verdict
+from reports.doubts import OFF_THE_SCANS, Doubt, weightiest_first
+from reports.verdict import badge, in_short, of_these_alone, remarks, unscored, verdict
 from reports.what_next import next_command, typed, warned, worst_frames
 from reports.worse import worse_sentence
 from tests.reports.fake_results import FakeCase, write_run
@@ -213,6 +213,20 @@ def test_warnings_stand_before_the_word_better(warnings: tuple[str, ...], text: 
 def test_a_warning_against_an_input_is_none_of_the_last() -> None:
     """The terminal and a page show five: behind these a wrong roll was one of "3 more warnings"."""
     assert weightiest_first(["a", "b", ROLLED, "c"]) == [ROLLED, "a", "b", "c"]
+
+
+def test_traces_off_the_scans_come_first_and_no_roll_is_advised() -> None:
+    """Mirrored own traces, met with a fitted roll, had a green ok; a warning of the roll stood above theirs."""
+    off = f"the manifest's {OFF_THE_SCANS} (frame 0: 0.68 mm off): check which curve belongs to which frame"
+    row = {"rms_mm": 2.0, "null_roll_unknown_rms_mm": 0.82, "skill_strongest": -1.0, "strongest_null": "roll_unknown"}
+    doubt = Doubt(warnings=weightiest_first(["few points", ROLLED, f"a: {off}"]))
+    assert list(doubt.warnings) == [f"a: {off}", ROLLED, "few points"]
+    said = verdict(row, doubt=doubt)
+    assert f"The weightiest of 3 warnings: a: {off}." in said
+    assert "With an unknown roll" not in said
+    assert not remarks(row, doubt=doubt)
+    good = badge("ok", True, row | {"skill_strongest": 0.9}, Doubt(warnings=[off]))
+    assert (good["text"], good["look"]) == ("ok, 1 warning", "poor")
 
 
 def test_a_wrong_roll_is_guessed_at() -> None:
