@@ -6,6 +6,7 @@ import json
 import shutil
 from collections.abc import Callable
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pandas as pd
@@ -507,5 +508,17 @@ def test_insertions_that_look_like_one_have_no_green_badge(tmp_path: Path) -> No
 def test_the_frame_of_a_share_is_told_apart_from_it(monkeypatch: pytest.MonkeyPatch, wires: int, said: str) -> None:
     """It was "in frame 5 71 % of the wire"."""
     monkeypatch.setattr(others, "_clearance", lambda _known, points: np.full(len(points), 9.0))
-    (text,) = others._outside(Known(), dict.fromkeys(range(wires), np.eye(3)), 0.18)
+    case = Mock(**{"wire.radius_mm": 0.18})
+    (text,) = others._outside(Known(), dict.fromkeys(range(wires), np.eye(3)), case)
     assert text.startswith(f"{said} of the wire lies outside the lumen")
+
+
+def test_a_tip_beyond_the_wall_is_told_however_short_it_is() -> None:
+    """The last 0.9 mm of a wire lay 0.9 mm outside a vessel of 2 mm in every frame, ok and without a warning."""
+    inside = np.full(100, -0.5)
+    tips = {n: np.append(inside, [0.4, mm]) for n, mm in enumerate((0.5, 0.7, 0.9))}
+    (text,) = others._through_wall(tips, 0.54)
+    assert text.startswith("2 frames, the worst is frame 2: the wire lies up to 0.90 mm beyond the lumen's wall, its")
+    (text,) = others._through_wall({7: np.append(tips[2], inside)}, 0.54)
+    assert text.startswith("frame 7: the wire lies up to 0.90 mm beyond the lumen's wall (expected 0.54 mm at most)")
+    assert not others._through_wall(tips, 1.0)
