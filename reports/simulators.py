@@ -22,6 +22,8 @@ from reports.verdict import NEVER_NEAREST, badge, first_that_holds, tips_off, ve
 
 PAGE = "simulators.html"
 _MOST_WARNINGS, _MOST_REASONS = 5, 3
+SAME = "the same error at every point"
+"""What the note of a pair of simulators says that cannot be told apart."""
 _MOST_SHARED = 0.75
 """Share of a simulator's frames up to which those that count for all of them are few."""
 
@@ -178,13 +180,19 @@ def nearer(rows: Sequence[Mapping[Any, Any]], off: Container[str] = ()) -> list[
     if not own:
         return []
     best = min(own, key=lambda row: (row["frames_ok"] < row["frames"], _farther_mm(row)))["simulator"]
-    others = {row["simulator"] for row in own}
-    return [_beside(row) for row in rows if row.get("against") == best and row["simulator"] in others]
+    others = [row["simulator"] for row in own]
+    pairs = [row for row in rows if row["simulator"] in others and row.get("against") in others]
+    of_best = [row for row in pairs if row["against"] == best]
+    alike = [row for row in pairs if best not in (row["simulator"], row["against"]) and SAME in str(row["interval"])]
+    once = [row for row in alike if others.index(row["against"]) < others.index(row["simulator"])]
+    return [beside(row) for row in (*of_best, *once)]
 
 
-def _beside(row: Mapping[Any, Any]) -> str:
+def beside(row: Mapping[Any, Any]) -> str:
     """Whether the simulator of a row is farther from the traced wires than that of ``against``: both ways, or not."""
     one, other = row["simulator"], row["against"]
+    if SAME in str(row["interval"]):
+        return f"{one} and {other} have {SAME} of all {counted(int(row['common_frames']), 'frame')}: is one a copy?"
     (value, low, high), back = (_with_ends(row, name) for name in ("rms_ratio", "back_ratio"))
     farther = low > 1.0 and (math.isnan(back[0]) or back[1] > 1.0)
     closer = high < 1.0 and (math.isnan(back[0]) or back[2] < 1.0)

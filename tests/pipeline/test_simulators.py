@@ -125,6 +125,20 @@ def test_who_is_nearer_is_said_for_the_best_and_every_other_one(compared: Path) 
     assert nearer([*alone, row]) == [told]
 
 
+def test_simulators_of_the_same_errors_are_a_copy_on_the_page_too(tmp_path: Path) -> None:
+    """The terminal asked whether one is a copy; the page said "not shown to be nearer: 1.00 times as far"."""
+    made = {name: write_tree(tmp_path / name, even(mm)) for name, mm in (("b", 0.3), ("best", 0.2))}
+    made["copy"] = shutil.copytree(made["b"], tmp_path / "copy")
+    said = write_comparison(tmp_path / "b", made)
+    page = render_simulators(tmp_path / "b").read_text(encoding="utf-8")
+    told = f"copy and b have the same error at every point of all {CASES * len(DEPTHS)} frames: is one a copy?"
+    assert told in said
+    assert f"<li>{told}</li>" in page
+    assert page.count("is one a copy?") == 1
+    write_comparison(tmp_path / "b", {"b": made["b"], "copy": made["copy"]})
+    assert "1.00 times as far" not in render_simulators(tmp_path / "b").read_text(encoding="utf-8")
+
+
 @pytest.mark.parametrize(
     ("rms", "back", "end"),
     [
@@ -400,7 +414,7 @@ def test_the_same_twice_is_a_tie(tmp_path: Path) -> None:
     both = {name: write_tree(tmp_path / name, even(0.2)) for name in ("wireval", "another")}
     said = write_comparison(tmp_path, both)
     assert set(pd.read_csv(tmp_path / "where.csv")["lead"].dropna()) == {"tie"}
-    assert "another / wireval, on 24 frames: 1.000 (95 %: 1.000 to 1.000" in said[0]
+    assert said[0] == "another and wireval have the same error at every point of all 24 frames: is one a copy?"
 
 
 def test_the_page(compared: Path) -> None:
