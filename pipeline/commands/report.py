@@ -38,6 +38,7 @@ def main(args: argparse.Namespace) -> int:
     """
     from pipeline.run.aggregate import aggregate
     from pipeline.run.last_words import last_line, lost_lines
+    from pipeline.run.own import not_loaded
     from pipeline.run.results import found_results
     from pipeline.run.sweep import found_heads, lost_points, write_sweep
     from reports.inside import misleading_links
@@ -50,7 +51,7 @@ def main(args: argparse.Namespace) -> int:
     if not found:
         return complain([_without_cases(args.out)], str(args.out), "; nothing was drawn")
     links = misleading_links(args.out)
-    if problems := links or damaged_records(args.out):
+    if problems := links or damaged_records(args.out) or not_loaded(args.out):
         return complain(problems, str(args.out), "; nothing was drawn")
     heads = found_heads(args.out)
     if removed := write_sweep(args.out, heads):
