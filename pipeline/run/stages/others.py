@@ -8,7 +8,7 @@ import numpy as np
 
 from pipeline.arrays.polyline import at_arc, resample, samples
 from pipeline.compare.metrics import rms
-from pipeline.load.wires import OtherFile, read_wires
+from pipeline.load.wires import OtherFile, read_wires, warned_beside
 from pipeline.model import Array, OtherWire, Wire, arc_length
 from pipeline.run.stages.in_itself import not_in_itself
 from pipeline.run.stages.known import Context, Frame, Known
@@ -58,6 +58,14 @@ def frames_of_others(run: Context, known: Known) -> tuple[Frame, ...]:
     log.warnings += rough(wires, voxel_mm, "the simulated wires", "give a point every millimetre")
     log.warnings += _kinked(wires, case.wire)
     return tuple(frames)
+
+
+def of_their_run(run: Context) -> list[str]:
+    """What another run was warned of whose wires these are, where this one was not: a roll that it found wrong, say."""
+    if run.case.simulated is None or not run.goes_to("simulate"):
+        return []
+    said = (text for text in warned_beside(run.case.simulated.files) if text not in run.log.warnings)
+    return [f"in the run that made these wires: {text}" for text in said]
 
 
 def _listed(files: Sequence[OtherFile]) -> str:
