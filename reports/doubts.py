@@ -19,6 +19,8 @@ OFF_THE_SCANS = "own curves are not where the scans show the wire"
 """What a warning of the user's own traces says that lie off the wires in the scans: every error is from these traces.
 
 Mirrored ones were met within 0.055 mm after their own advice, to fit the roll, while they lay 0.7 mm off the scans."""
+IN_ONE_LINE = "mm in one line"
+"""What a warning of a wire of two points says, which shows no roll."""
 AGAINST_INPUTS = (
     " from the traced one, as stated ", " insertion_mm states", " in entry_direction as stated", "the given lumen lies "
 )  # fmt: skip
@@ -45,9 +47,9 @@ class Doubt(NamedTuple):
         return next((text for text in weightiest_first(self.warnings) if _rank(text) < _OTHERS), "")
 
     @property
-    def off_the_scans(self) -> bool:
-        """Whether traces lie off the wires that the scans show, so that no input can be told from them."""
-        return any(OFF_THE_SCANS in text for text in self.warnings)
+    def shows_no_roll(self) -> bool:
+        """Whether traces lie off the wires that the scans show, or a wire is one line: no roll is told from these."""
+        return any(words in text for text in self.warnings for words in (OFF_THE_SCANS, IN_ONE_LINE))
 
 
 NO_DOUBT = Doubt()

@@ -11,7 +11,7 @@ import pandas as pd
 from reports import _content
 from reports.alike import alike
 from reports.case_files import counted, listed, not_reached, not_run_sentence
-from reports.doubts import OFF_THE_SCANS, Doubt, copied_from_traces, doubt_in, doubted, twins, warnings_in
+from reports.doubts import IN_ONE_LINE, OFF_THE_SCANS, Doubt, copied_from_traces, doubt_in, doubted, twins, warnings_in
 from reports.figures.simulators import SimulatorFiles, leads
 from reports.gates import gates_in
 from reports.origin import why_not_pooled
@@ -88,7 +88,8 @@ def _said(alone: Mapping[Any, Any], folder: Path, lines: Sequence[str], copied: 
     why = {"cases missing": missing, "frames failed": failed, "not pooled": mixed, "gate closed": closed}
     status = first_that_holds(why)
     off_scans = [text for text in doubt_in(folder).warnings if OFF_THE_SCANS in text]
-    doubt = Doubt("" if missing or failed or mixed else copied, twins(doubted(folder)), off_scans)
+    in_line = [line for line in lines if IN_ONE_LINE in line]
+    doubt = Doubt("" if missing or failed or mixed else copied, twins(doubted(folder)), [*off_scans, *in_line])
     said = verdict(row, alone["simulator"], doubt)
     lines = [line for line in lines if line not in (doubt.copied, *off_scans)]
     said = said or mixed or not_reached(folder) or "No frame of it has a result." * (not good)

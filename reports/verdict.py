@@ -113,7 +113,7 @@ def _unknown_roll(statistics: Mapping[str, Any], simulator: str, doubt: Doubt) -
 
     Not of traces that lie off the scans: a roll that is fitted to these hides it.
     """
-    if doubt.off_the_scans:
+    if doubt.shows_no_roll:
         return ""
     rms, unknown = (_number(statistics.get(key)) for key in ("rms_mm", "null_roll_unknown_rms_mm"))
     if not _skill(statistics)[1] <= 0.0 or not unknown < FAR_BELOW * rms:

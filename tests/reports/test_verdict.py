@@ -225,6 +225,8 @@ def test_traces_off_the_scans_come_first_and_no_roll_is_advised() -> None:
     assert f"The weightiest of 3 warnings: a: {off}." in said
     assert "With an unknown roll" not in said
     assert not remarks(row, doubt=doubt)
+    two_points = Doubt(warnings=["the wires have few points (frame 0: 7.8 mm in one line)"])
+    assert not remarks(row, "mine", two_points), "a wire of two points shows no roll, and few points are the cause"
     good = badge("ok", True, row | {"skill_strongest": 0.9}, Doubt(warnings=[off]))
     assert (good["text"], good["look"]) == ("ok, 1 warning", "poor")
 
