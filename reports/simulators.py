@@ -18,7 +18,8 @@ from reports.origin import why_not_pooled
 from reports.page import draw_sections, write_page
 from reports.schema import FAILURES, OURS, OVERALL_FILE, SIMULATORS, SUMMARY, WHERE, Column
 from reports.tables import first_row, in_texts, read_if_there
-from reports.verdict import NEVER_NEAREST, badge, first_that_holds, tips_off, verdict
+from reports.tips import tips_off
+from reports.verdict import NEVER_NEAREST, badge, first_that_holds, headline, meaning_of_rival
 
 PAGE = "simulators.html"
 _MOST_WARNINGS, _MOST_REASONS = 5, 3
@@ -43,16 +44,21 @@ def render_simulators(out_dir: Path, embed: bool = False) -> Path:
     alien = {name: _not_ours(own, warnings.get(OURS, {})) for name, own in warnings.items()}
     alone = {str(row["simulator"]): row for row in table.to_dict("records")}
     few = set(_with_few(table)["simulator"])
+    told = [
+        {"name": name, "link": links[name]}
+        | _said(alone[name], folder, alien[name], copied.get(name, ""), few=name in few)
+        for name, folder in folders.items()
+    ]
     page = {
         "title": "Simulators side by side - wireval",
         "names": list(folders),
         "nearer": nearer(files.simulators.to_dict("records"), off=_off(table, copied)),
         "first": next(iter(places)),
-        "said": [
-            {"name": name, "link": links[name]}
-            | _said(alone[name], folder, alien[name], copied.get(name, ""), few=name in few)
-            for name, folder in folders.items()
-        ],
+        "said": told,
+        "rivals": {
+            _content.predictor_label(rival): meaning_of_rival(rival)
+            for rival in dict.fromkeys(one["rival"] for one in told if one["rival"])
+        },
         "ours": OURS if OURS in folders else "",
         "interval": next(iter(table["interval"].dropna()), ""),
         "simulators": grid,
@@ -90,17 +96,22 @@ def _said(alone: Mapping[Any, Any], folder: Path, lines: Sequence[str], copied: 
     off_scans = [text for text in doubt_in(folder).warnings if OFF_THE_SCANS in text]
     in_line = [line for line in lines if IN_ONE_LINE in line]
     doubt = Doubt("" if missing or failed or mixed else copied, twins(doubted(folder)), [*off_scans, *in_line])
-    said = verdict(row, alone["simulator"], doubt)
+    said, more = headline(row, alone["simulator"], doubt, defined=False)
     lines = [line for line in lines if line not in (doubt.copied, *off_scans)]
     said = said or mixed or not_reached(folder) or "No frame of it has a result." * (not good)
-    aside = _without_others(*alone_skill, row) + f" Of the study {missing}." * bool(missing)
-    more = counted(rest := len(lines) - _MOST_WARNINGS, "more warning")
+    more += filter(None, [_without_others(*alone_skill, row), f"Of the study {missing}." * bool(missing)])
+    rest = len(lines) - _MOST_WARNINGS
     return {
         "badge": badge(status, status == "ok", row, doubt),
-        "verdict": said + aside,
+        "verdict": said,
+        "more": more,
+        "rival": str(row.get("strongest_null")) if said and pd.notna(row.get("strongest_null")) else "",
         "closed": closed,
         "failures": _failed(folder, alone["simulator"]) if failed else [],
-        "warnings": [*lines[:_MOST_WARNINGS], *[f"{more} on the pages of its cases"] * (rest > 0)],
+        "warnings": [
+            *lines[:_MOST_WARNINGS],
+            *[f"{counted(rest, 'more warning')} on the pages of its cases"] * (rest > 0),
+        ],
     }
 
 
@@ -109,7 +120,7 @@ def _without_others(skill: Any, frames: Any, beside: Mapping[str, Any]) -> str:
     if pd.isna(frames) or pd.isna(skill) or frames == beside.get("strongest_frames"):
         return ""
     own = f"{_content.number(skill)}, over {counted(int(frames), 'frame')}"
-    return f" This skill is on the frames of all; the skill on its own pages is {own}."
+    return f"This skill is on the frames of all; the skill on its own pages is {own}."
 
 
 def _failed(folder: Path, name: str) -> list[str]:

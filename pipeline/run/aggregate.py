@@ -26,7 +26,8 @@ from reports.gates import GATES, asked_of
 from reports.junit import Outcome, write_junit
 from reports.origin import why_not_pooled
 from reports.schema import ERRORS, FAILURES, OVERALL_FILE, SUMMARY, TIMINGS
-from reports.verdict import remarks, unscored
+from reports.unscored import unscored
+from reports.verdict import remarks
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,8 @@ from reports.origin import why_not_pooled
 from reports.run_page import render_index
 from reports.schema import FAILURES, OURS, POINTS, SIMULATORS, WHERE
 from reports.simulators import SAME, beside, in_common, nearer, render_simulators
-from reports.verdict import COPIED, TIPS_OFF, tips_off
+from reports.tips import tips_off
+from reports.verdict import COPIED, TIPS_OFF
 
 STEPS_MM = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
 MOST_BINS = 12
