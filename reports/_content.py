@@ -133,6 +133,11 @@ def _withheld(statistics: Mapping[str, Any], name: str) -> str:
     return ""
 
 
+def value_of(value: Any) -> float:
+    """A field as a number, NaN where it is empty."""
+    return math.nan if number(value) == NOTHING else float(value)
+
+
 def predictor_label(name: str) -> str:
     """A trivial predictor as figures call it; its name where they show none of it."""
     column = f"null_{name}_rms_mm"

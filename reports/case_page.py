@@ -13,7 +13,8 @@ from reports.figures import declared
 from reports.listing import listed_files, listed_view
 from reports.page import Each, begun_first, longest, one_by_one, section, write_page
 from reports.schema import ERRORS, FAILURES
-from reports.verdict import OF_CALIBRATION, badge, verdict
+from reports.unscored import OF_CALIBRATION
+from reports.verdict import badge, headline
 from reports.viewer import viewer_data
 from reports.what_next import next_command, typed, worst_frames
 
@@ -36,7 +37,7 @@ def render_case(case_dir: Path, embed: bool = False, each: Each = one_by_one) ->
         "title": " - ".join(filter(None, (case.name, case.simulator, "wireval"))),
         "name": case.name,
         "badge": badge(result.get("status", "no result.json"), result.get("status") in GOOD, _scored(case), doubt),
-        "verdict": _case_verdict(case, doubt),
+        **_case_verdict(case, doubt),
         "worst": worst_frames({case.name: errors}, {}),
         "next": next_command([case.name], typed(case_dir)),
         **_drawn(case, embed, each),
@@ -92,8 +93,8 @@ def _scored(case: CaseFiles) -> Mapping[str, Any]:
     return {} if case.result.get("role") == "calibration" else case.statistics
 
 
-def _case_verdict(case: CaseFiles, doubt: Doubt) -> str:
-    """What became of the case, how many frames have a result, and how good they are.
+def _case_verdict(case: CaseFiles, doubt: Doubt) -> dict[str, Any]:
+    """What became of the case, how many frames have a result, and how good they are; what more there is to know.
 
     Where some have none, why stands below, with the frames and the next command: said here, too, it read as if it were
     of all.
@@ -101,7 +102,8 @@ def _case_verdict(case: CaseFiles, doubt: Doubt) -> str:
     nothing = "the case has no result.json: it did not finish; see log.txt"
     said = str(case.result.get("sentence", nothing)).strip().rstrip(".")
     scored = _scored(case)
-    how = verdict(scored, case.simulator, doubt) if scored or not case.statistics else OF_CALIBRATION
+    judges = bool(scored) or not case.statistics
+    how, more = headline(scored, case.simulator, doubt) if judges else (OF_CALIBRATION, [])
     good, planned = case.statistics.get("frames_ok"), case.statistics.get("frames")
     became = said[:1].upper() + said[1:] + "."
     if fitted := case.statistics.get("frames_fitted"):
@@ -112,7 +114,7 @@ def _case_verdict(case: CaseFiles, doubt: Doubt) -> str:
     ids = {name for run in runs_in(case.folder.parents[1]) for name in run.get("planned") or ()}
     alone = "The predictor 'another insertion' may be stronger; it is judged over the run, on its first page."
     alone *= judged and len(ids) != 1
-    return " ".join(filter(None, (became, how, alone)))
+    return {"verdict": " ".join(filter(None, (became, how))), "more": [*more, *[alone] * bool(alone)]}
 
 
 def scored_or_ok(cases: Sequence[CaseFiles]) -> str:

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from reports.case_files import find_cases, listed, runs_in
+from reports.case_files import find_cases, listed, results_in, runs_in
 from reports.records import read_json
 
 AMONG = "doubts.json"
@@ -15,10 +15,18 @@ COUNT_AS = ", and count as "
 """What is said of insertions that look like fewer."""
 MADE_FROM_TRACES = "only wires that were made from the traces"
 """What a warning of wires that lie nearer to the traces than these are known says; their errors are none."""
+OFF_THE_SCANS = "own curves are not where the scans show the wire"
+"""What a warning of the user's own traces says that lie off the wires in the scans: every error is from these traces.
+
+Mirrored ones were met within 0.055 mm after their own advice, to fit the roll, while they lay 0.7 mm off the scans."""
+IN_ONE_LINE = "mm in one line"
+"""What a warning of a wire of two points says, which shows no roll."""
 AGAINST_INPUTS = (
     " from the traced one, as stated ", " insertion_mm states", " in entry_direction as stated", "the given lumen lies "
 )  # fmt: skip
 """What warnings say that speak against an input: roll, tip's curve or catheter; depths; the clamp; a given lumen."""
+
+_OTHERS = 2
 
 
 class Doubt(NamedTuple):
@@ -26,7 +34,7 @@ class Doubt(NamedTuple):
 
     copied : the warning that the wires were made from the traces, so that no number counts; empty if there is none.
     twins : the doubt that some insertions look like one that was scanned twice, but count as several; empty likewise.
-    warnings : all that stand on the page, those that speak against an input first.
+    warnings : all that stand on the page, those against the traces first, then those that speak against an input.
     """
 
     copied: str = ""
@@ -35,20 +43,29 @@ class Doubt(NamedTuple):
 
     @property
     def against(self) -> str:
-        """The first warning that an input is wrong; empty where none says so."""
-        return next(filter(_against_inputs, self.warnings), "")
+        """The weightiest warning that traces or an input are wrong; empty where none says so."""
+        return next((text for text in weightiest_first(self.warnings) if _rank(text) < _OTHERS), "")
+
+    @property
+    def shows_no_roll(self) -> bool:
+        """Whether traces lie off the wires that the scans show, or a wire is one line: no roll is told from these."""
+        return any(words in text for text in self.warnings for words in (OFF_THE_SCANS, IN_ONE_LINE))
 
 
 NO_DOUBT = Doubt()
 
 
 def weightiest_first(warnings: Iterable[str]) -> list[str]:
-    """Warnings, those first that speak against an input: a page shows five, and a wrong roll moves all wires."""
-    return sorted(warnings, key=lambda text: not _against_inputs(text))
+    """Warnings, those first that speak against the traces, then those against an input: a page shows five, and a wrong
+    roll moves all wires.
+    """
+    return sorted(warnings, key=_rank)
 
 
-def _against_inputs(warning: str) -> bool:
-    return any(words in warning for words in AGAINST_INPUTS)
+def _rank(warning: str) -> int:
+    if OFF_THE_SCANS in warning:
+        return 0
+    return 1 if any(words in warning for words in AGAINST_INPUTS) else _OTHERS
 
 
 def warnings_of(folder: Path) -> list[str]:
@@ -100,6 +117,11 @@ def doubt_of(out_dir: Path, results: Mapping[str, Mapping[str, Any]]) -> Doubt:
     doubts, copied = doubted(out_dir), {case: result.get("warnings", ()) for case, result in results.items()}
     said = weightiest_first([*doubts, *said_by_cases(results, "warnings")])
     return Doubt(copied_from_traces(copied), twins(doubts), said)
+
+
+def doubt_in(out_dir: Path) -> Doubt:
+    """What is warned of on a run's page, from its folder alone."""
+    return doubt_of(out_dir, results_in(out_dir))
 
 
 def doubted(out_dir: Path) -> list[str]:

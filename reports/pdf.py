@@ -30,7 +30,8 @@ from reports.records import read_json
 from reports.run_page import readable_cases, run_files
 from reports.schema import FAILURES, OVERALL_FILE, SUMMARY
 from reports.tables import first_row, in_texts, read_if_there
-from reports.verdict import unscored, verdict
+from reports.unscored import unscored
+from reports.verdict import verdict
 from reports.what_next import next_command, typed, worst_frames
 from reports.worse import worse_sentence
 

@@ -35,7 +35,8 @@ from reports.schema import FAILURES, OVERALL_FILE, SIMULATORS, SUMMARY, SWEEP
 from reports.sweep import not_run_sentence as not_swept_sentence
 from reports.sweep import silent_points
 from reports.tables import first_row, in_texts, read_if_there
-from reports.verdict import badge, first_that_holds, of_these_alone, unscored, verdict
+from reports.unscored import unscored
+from reports.verdict import badge, first_that_holds, headline, of_these_alone
 from reports.what_next import next_command, typed, worst_frames
 from reports.worse import worse_cases, worse_sentence
 
@@ -170,8 +171,9 @@ def _judged(
 ) -> dict[str, Any]:
     """Badge, verdict and warnings over all cases. row : of overall.csv.     why_none : why there may be no verdict."""
     doubt = doubt_of(out_dir, {case.name: case.result for case in cases})
-    said = " ".join(filter(None, (verdict(row, _simulator(cases), doubt), of_these_alone(row)))) or why_none
-    return {"badge": badge(status, status == "ok", row, doubt), "verdict": said, "warnings": doubt.warnings}
+    said, more = headline(row, _simulator(cases), doubt)
+    told = {"verdict": said or why_none, "more": [*more, *filter(None, [of_these_alone(row)])]}
+    return told | {"badge": badge(status, status == "ok", row, doubt), "warnings": doubt.warnings}
 
 
 def _headline(cases: list[CaseFiles], missing: Sequence[str], damaged: Container[str]) -> dict[str, str]:

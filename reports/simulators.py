@@ -11,17 +11,20 @@ import pandas as pd
 from reports import _content
 from reports.alike import alike
 from reports.case_files import counted, listed, not_reached, not_run_sentence
-from reports.doubts import Doubt, copied_from_traces, doubted, twins, warnings_in
+from reports.doubts import IN_ONE_LINE, OFF_THE_SCANS, Doubt, copied_from_traces, doubt_in, doubted, twins, warnings_in
 from reports.figures.simulators import SimulatorFiles, leads
 from reports.gates import gates_in
 from reports.origin import why_not_pooled
 from reports.page import draw_sections, write_page
 from reports.schema import FAILURES, OURS, OVERALL_FILE, SIMULATORS, SUMMARY, WHERE, Column
 from reports.tables import first_row, in_texts, read_if_there
-from reports.verdict import NEVER_NEAREST, badge, first_that_holds, tips_off, verdict
+from reports.tips import tips_off
+from reports.verdict import NEVER_NEAREST, badge, first_that_holds, headline, meaning_of_rival
 
 PAGE = "simulators.html"
 _MOST_WARNINGS, _MOST_REASONS = 5, 3
+SAME = "the same error at every point"
+"""What the note of a pair of simulators says that cannot be told apart."""
 _MOST_SHARED = 0.75
 """Share of a simulator's frames up to which those that count for all of them are few."""
 
@@ -41,16 +44,21 @@ def render_simulators(out_dir: Path, embed: bool = False) -> Path:
     alien = {name: _not_ours(own, warnings.get(OURS, {})) for name, own in warnings.items()}
     alone = {str(row["simulator"]): row for row in table.to_dict("records")}
     few = set(_with_few(table)["simulator"])
+    told = [
+        {"name": name, "link": links[name]}
+        | _said(alone[name], folder, alien[name], copied.get(name, ""), few=name in few)
+        for name, folder in folders.items()
+    ]
     page = {
         "title": "Simulators side by side - wireval",
         "names": list(folders),
         "nearer": nearer(files.simulators.to_dict("records"), off=_off(table, copied)),
         "first": next(iter(places)),
-        "said": [
-            {"name": name, "link": links[name]}
-            | _said(alone[name], folder, alien[name], copied.get(name, ""), few=name in few)
-            for name, folder in folders.items()
-        ],
+        "said": told,
+        "rivals": {
+            _content.predictor_label(rival): meaning_of_rival(rival)
+            for rival in dict.fromkeys(one["rival"] for one in told if one["rival"])
+        },
         "ours": OURS if OURS in folders else "",
         "interval": next(iter(table["interval"].dropna()), ""),
         "simulators": grid,
@@ -85,18 +93,25 @@ def _said(alone: Mapping[Any, Any], folder: Path, lines: Sequence[str], copied: 
     closed = gates_in(folder)["closed"]
     why = {"cases missing": missing, "frames failed": failed, "not pooled": mixed, "gate closed": closed}
     status = first_that_holds(why)
-    doubt = Doubt("" if missing or failed or mixed else copied, twins(doubted(folder)))
-    said = verdict(row, alone["simulator"], doubt)
-    lines = [line for line in lines if line != doubt.copied]
+    off_scans = [text for text in doubt_in(folder).warnings if OFF_THE_SCANS in text]
+    in_line = [line for line in lines if IN_ONE_LINE in line]
+    doubt = Doubt("" if missing or failed or mixed else copied, twins(doubted(folder)), [*off_scans, *in_line])
+    said, more = headline(row, alone["simulator"], doubt, defined=False)
+    lines = [line for line in lines if line not in (doubt.copied, *off_scans)]
     said = said or mixed or not_reached(folder) or "No frame of it has a result." * (not good)
-    aside = _without_others(*alone_skill, row) + f" Of the study {missing}." * bool(missing)
-    more = counted(rest := len(lines) - _MOST_WARNINGS, "more warning")
+    more += filter(None, [_without_others(*alone_skill, row), f"Of the study {missing}." * bool(missing)])
+    rest = len(lines) - _MOST_WARNINGS
     return {
         "badge": badge(status, status == "ok", row, doubt),
-        "verdict": said + aside,
+        "verdict": said,
+        "more": more,
+        "rival": str(row.get("strongest_null")) if said and pd.notna(row.get("strongest_null")) else "",
         "closed": closed,
         "failures": _failed(folder, alone["simulator"]) if failed else [],
-        "warnings": [*lines[:_MOST_WARNINGS], *[f"{more} on the pages of its cases"] * (rest > 0)],
+        "warnings": [
+            *lines[:_MOST_WARNINGS],
+            *[f"{counted(rest, 'more warning')} on the pages of its cases"] * (rest > 0),
+        ],
     }
 
 
@@ -105,7 +120,7 @@ def _without_others(skill: Any, frames: Any, beside: Mapping[str, Any]) -> str:
     if pd.isna(frames) or pd.isna(skill) or frames == beside.get("strongest_frames"):
         return ""
     own = f"{_content.number(skill)}, over {counted(int(frames), 'frame')}"
-    return f" This skill is on the frames of all; the skill on its own pages is {own}."
+    return f"This skill is on the frames of all; the skill on its own pages is {own}."
 
 
 def _failed(folder: Path, name: str) -> list[str]:
@@ -177,13 +192,19 @@ def nearer(rows: Sequence[Mapping[Any, Any]], off: Container[str] = ()) -> list[
     if not own:
         return []
     best = min(own, key=lambda row: (row["frames_ok"] < row["frames"], _farther_mm(row)))["simulator"]
-    others = {row["simulator"] for row in own}
-    return [_beside(row) for row in rows if row.get("against") == best and row["simulator"] in others]
+    others = [row["simulator"] for row in own]
+    pairs = [row for row in rows if row["simulator"] in others and row.get("against") in others]
+    of_best = [row for row in pairs if row["against"] == best]
+    alike = [row for row in pairs if best not in (row["simulator"], row["against"]) and SAME in str(row["interval"])]
+    once = [row for row in alike if others.index(row["against"]) < others.index(row["simulator"])]
+    return [beside(row) for row in (*of_best, *once)]
 
 
-def _beside(row: Mapping[Any, Any]) -> str:
+def beside(row: Mapping[Any, Any]) -> str:
     """Whether the simulator of a row is farther from the traced wires than that of ``against``: both ways, or not."""
     one, other = row["simulator"], row["against"]
+    if SAME in str(row["interval"]):
+        return f"{one} and {other} have {SAME} of all {counted(int(row['common_frames']), 'frame')}: is one a copy?"
     (value, low, high), back = (_with_ends(row, name) for name in ("rms_ratio", "back_ratio"))
     farther = low > 1.0 and (math.isnan(back[0]) or back[1] > 1.0)
     closer = high < 1.0 and (math.isnan(back[0]) or back[2] < 1.0)

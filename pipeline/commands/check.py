@@ -5,7 +5,7 @@ import argparse
 from pipeline.commands import add_settings, resolved_settings, say
 from pipeline.commands.given import add_manifest, assumed_in, given
 
-HELP = "list every problem of a manifest at once; reads headers only"
+HELP = "list every problem of a manifest at once; reads of scans the headers alone"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

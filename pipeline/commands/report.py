@@ -40,8 +40,6 @@ def main(args: argparse.Namespace) -> int:
     from pipeline.run.last_words import last_line, lost_lines
     from pipeline.run.results import found_results
     from pipeline.run.sweep import found_heads, lost_points, write_sweep
-    from reports.inside import misleading_links
-    from reports.records import damaged_records
     from reports.run_page import render_index
     from reports.simulators import folders_in
     from reports.sweep import not_run, not_run_sentence
@@ -49,8 +47,7 @@ def main(args: argparse.Namespace) -> int:
     found = found_results(args.out)
     if not found:
         return complain([_without_cases(args.out)], str(args.out), "; nothing was drawn")
-    links = misleading_links(args.out)
-    if problems := links or damaged_records(args.out):
+    if problems := _unusable(args.out):
         return complain(problems, str(args.out), "; nothing was drawn")
     heads = found_heads(args.out)
     if removed := write_sweep(args.out, heads):
@@ -72,6 +69,15 @@ def main(args: argparse.Namespace) -> int:
     sys.stderr.writelines(f"FAIL: {first}{line}\n" for line in totals.closed)
     say(last_line(totals, page))
     return 0 if totals.all_ok and not (totals.closed or totals.missing) and others_ok and drawn and whole else 1
+
+
+def _unusable(out: Path) -> list[str]:
+    """Why nothing can be drawn of a folder with results: tables and pages would be of other files, or lack columns."""
+    from pipeline.run.own import not_loaded
+    from reports.inside import misleading_links
+    from reports.records import damaged_records
+
+    return misleading_links(out) or damaged_records(out) or not_loaded(out)
 
 
 def _without_cases(out: Path) -> str:

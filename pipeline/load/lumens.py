@@ -15,6 +15,20 @@ from pipeline.load.stated import stated_in_table
 from pipeline.load.surfaces import read_stl, read_vtp
 from pipeline.model import Array, Branches, Shapes, Volume
 
+FAR_OUTSIDE, FAR_OUTSIDE_MM = 2.0, 1.5
+"""Voxels and mm outside a given lumen, the larger counts, from which an entry was not meant for it: one in its wall is
+the solver's to judge."""
+LOOK_AT = (
+    "check its axes (LPS or RAS), its grid (was the scan's geometry kept?), its unit, which label is meant, and "
+    "whether it reaches to the entry"
+)
+"""What to look at where it was not."""
+
+
+def meant_within_mm(voxel_mm: float, entry_sigma_mm: float | None) -> float:
+    """How far outside a given lumen an entry, known to a standard deviation, may lie that is meant for it, mm."""
+    return max(FAR_OUTSIDE * voxel_mm, FAR_OUTSIDE_MM, 2.0 * (entry_sigma_mm or 0.0))
+
 
 def read_swc(path: Path) -> Branches:
     """A .swc tree: number, type, x, y, z, radius, parent (-1 = root), LPS mm unless a comment states another."""

@@ -7,6 +7,7 @@ or RAS that is taken for mm and LPS is another wire. A frame without a usable wi
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -126,14 +127,23 @@ def _in_hdf5(path: Path, count: int, space: str, unit: str) -> list[OtherFile]:
 
 def _refused_beside(wires: Path) -> dict[int, tuple[str, ...]]:
     """By number the frames whose simulation failed in the run that wrote these wires, and why; by no other file."""
+    frames, why = _beside(wires).get("frames", []), ("status", "sentence", "message")
+    return {f["frame"]: tuple(f.get(key) or "" for key in why) for f in frames if f.get("stage") == "simulate"}
+
+
+def warned_beside(files: Sequence[Source]) -> list[str]:
+    """What the run that wrote these wires was warned of; nothing for wires of another origin."""
+    return list(_beside(files[0].path).get("warnings", ())) if len(files) == 1 else []
+
+
+def _beside(wires: Path) -> dict[str, Any]:
+    """The result of the run that wrote these wires; empty for any other file."""
     if wires.name != "frames.h5":
         return {}
     try:
-        frames = read_result(wires.with_name("result.json")).get("frames", [])
+        return read_result(wires.with_name("result.json"))
     except UnreadableError as error:
         raise LoadError(str(error)) from None
-    why = ("status", "sentence", "message")
-    return {f["frame"]: tuple(f.get(key) or "" for key in why) for f in frames if f.get("stage") == "simulate"}
 
 
 def _by_number(path: Path, frames: h5py.Group) -> dict[int, h5py.Group]:

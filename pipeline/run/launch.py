@@ -167,7 +167,7 @@ def launch(plan: Plan) -> tuple[Totals, Path]:
     info |= {"stated": {case.id: stated(case) for case in plan.manifest.cases}}
     info |= {"planned": [case.id for case in plan.manifest.cases], "doubts": continued(plan.manifest.cases)}
     info |= {"to_score": {case.id: case.frames_to_score for case in plan.manifest.cases if case.frames_to_score}}
-    info |= {"fail_if": [gate.text for gate in plan.gates]}
+    info |= {"fail_if": [gate.text for gate in plan.gates], **({"own": own} if (own := registered()) else {})}
     name = f"run.{plan.shard.replace('/', '-')}.json" if plan.shard else "run.json"
     info |= {"left_out": _never_asked(out / name, plan.left_out), "config": settings.as_dict()}
     swept, ran = (out / SWEEP.file).exists(), bool(run_records(out))

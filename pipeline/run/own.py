@@ -2,10 +2,11 @@
 
 import importlib
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import TypeVar
 
 from pipeline.status import UsageError
-from reports.case_files import listed
+from reports.case_files import listed, runs_in
 from reports.schema import ERRORS
 
 J = TypeVar("J")
@@ -17,6 +18,17 @@ DO = "register it at the top level of a module that workers can import, or run w
 def registered() -> dict[str, str]:
     """The columns that were registered, each with the module that did."""
     return {column.name: column.module for column in ERRORS if column.module}
+
+
+def not_loaded(out: Path) -> list[str]:
+    """Columns of the runs into a folder that were registered where this process has not: tables would lose them."""
+    known = {name: module for run in runs_in(out) for name, module in run.get("own", {}).items()}
+    return [
+        f"{name} was registered by {module}, which is not loaded here: its columns would be lost; in Python import it, "
+        f"then pipeline.cli.main(['report', {str(out)!r}])"
+        for name, module in known.items()
+        if name not in registered()
+    ]
 
 
 def refuse_scripts(own: Mapping[str, str]) -> None:

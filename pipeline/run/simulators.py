@@ -6,7 +6,6 @@ planned frames: a simulator gains nothing by failing in the hard ones.
 """
 
 from collections.abc import Iterator, Mapping, Sequence, Set
-from itertools import combinations
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -23,8 +22,9 @@ from reports.doubts import copied_from_traces, warnings_in
 from reports.origin import why_not_pooled
 from reports.run_page import render_index
 from reports.schema import FAILURES, OURS, POINTS, SIMULATORS, WHERE
-from reports.simulators import in_common, nearer, render_simulators
-from reports.verdict import COPIED, TIPS_OFF, tips_off
+from reports.simulators import SAME, beside, in_common, nearer, render_simulators
+from reports.tips import tips_off
+from reports.verdict import COPIED, TIPS_OFF
 
 STEPS_MM = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
 MOST_BINS = 12
@@ -65,35 +65,31 @@ def write_comparison(out: Path, folders: Mapping[str, Path]) -> list[str]:
         both = ratio(studies[other], studies[one])
         if both is not None:
             caveat = _caveat({name for name in (one, other) if off.get(name) == TIPS_OFF})
+            same = _same(studies[one], studies[other])
+            caveat += [SAME] * same
             found = zip(RATIOS, (both.value, both.low, both.high, *both.back), strict=True)
             values = {name: value for name, value in found if name in RATIOS[:3] or np.isfinite(both.back[0])}
             row, told = intervals.fields(values, "; ".join([both.note, *caveat]))
             rows.append({"simulator": one, "against": other, "common_frames": both.frames, "interval": told, **row})
             if other == OURS:
                 said = both.sentence.replace("the second run / the first", f"{one} / {OURS}")
-                sentences.append("; ".join([said, *caveat]))
+                sentences.append(beside(rows[-1]) if same else "; ".join([said, *caveat]))
     sentences += nearer([row for row in rows if OURS not in (row["simulator"], row.get("against"))], off)
     tables.write(out / SIMULATORS.file, SIMULATORS, rows)
     tables.write(out / WHERE.file, WHERE, [] if mixed else list(_where(folders, judged, common, off)))
-    sentences += _twins(studies)
     none = [row["simulator"] for row in rows if row.get("frames_ok") == 0]
     if none and common and not mixed:
         sentences.append(f"who is nearest where is left out: no frame counts for {listed(none)}")
     return sentences
 
 
-def _twins(studies: Studies) -> list[str]:
-    """A sentence for every two simulators whose errors are the same at every point of all frames."""
-    of = {
-        name: {(case.result.case, n): frame.error_mm for case in validation(found) for n, frame in case.frames.items()}
-        for name, found in studies.items()
-    }
-    return [
-        f"{one} and {other} have the same error at every point of all {len(of[one])} frames: is one a copy?"
-        for one, other in combinations(of, 2)
-        if of[one] and of[one].keys() == of[other].keys()
-        if all(np.array_equal(error, of[other][frame]) for frame, error in of[one].items())
-    ]
+def _same(one: Sequence[Found], other: Sequence[Found]) -> bool:
+    """Whether the errors of two simulators are the same at every point of all frames."""
+    mine, theirs = (
+        {(case.result.case, n): frame.error_mm for case in validation(found) for n, frame in case.frames.items()}
+        for found in (one, other)
+    )
+    return mine.keys() == theirs.keys() and all(np.array_equal(mine[n], theirs[n]) for n in mine)
 
 
 def _caveat(off: Set[str]) -> list[str]:

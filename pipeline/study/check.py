@@ -1,4 +1,4 @@
-"""Every problem of a study at once, from the manifest and the scans' headers alone."""
+"""Every problem of a study at once, from the manifest, the scans' headers and the small files."""
 
 from collections.abc import Callable, Container, Iterator, Sequence
 from itertools import islice
@@ -6,21 +6,17 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from pipeline.arrays.grids import corners_mm
 from pipeline.load import Header, LoadError, Scans, Source, each_volume, read_header, require_one, require_whole
 from pipeline.load.curves import read_curve, read_truth
 from pipeline.load.guard import is_folder, status_of
-from pipeline.load.lumens import read_lumen
-from pipeline.load.masks import mask_header
 from pipeline.load.views import read_views
 from pipeline.load.wires import read_wires
-from pipeline.model import Array, Branches, Shapes
 from pipeline.simulate.others import oddity
 from pipeline.status import nearest
 from pipeline.study.coarse import too_coarse
 from pipeline.study.manifest import Case, not_one_per_frame
+from pipeline.study.own_lumen import fitting, lumen_problems
 from pipeline.study.parameters import ParametersError, read_parameters
 from pipeline.study.same_grid import apart
 from pipeline.study.same_scans import repeated
@@ -28,8 +24,6 @@ from pipeline.study.settings import Config
 from pipeline.study.sources import files_of, is_pattern
 
 T = TypeVar("T")
-NEAR_MM = 20.0
-"""An entry further than this from the box of the own lumen was not meant for it."""
 MOST_BESIDE = 2000
 """Names in a folder among which the one that was meant is looked for."""
 
@@ -59,7 +53,9 @@ def check_case(case: Case, config: Config, *, whole: bool = True) -> list[str]:
             read_parameters(case.parameters)
         except ParametersError as error:
             found += error.problems
-    return [*found, *_lumen_problems(case, config, absent)]
+    if case.lumen is not None and case.lumen.path not in absent:
+        found += lumen_problems(case, case.lumen, config.segment.least_voxels)
+    return found
 
 
 class _Findings(list[str]):
@@ -114,44 +110,6 @@ def _absent(case: Case) -> Iterator[tuple[Path, str]]:
             yield path, str(error)
 
 
-def _lumen_problems(case: Case, config: Config, absent: Container[Path]) -> Iterator[str]:
-    """What is wrong with the user's own lumen; of a label map its header alone is read."""
-    if case.lumen is None or case.lumen.path in absent:
-        return
-    try:
-        if case.lumen.path.name.lower().endswith((".swc", ".mrk.json", ".stl", ".vtp")):
-            found = read_lumen(case.lumen, config.segment.least_voxels)
-            assert isinstance(found, (Branches, Shapes))
-            ends = found.points_mm if isinstance(found, Shapes) else np.concatenate([found.start_mm, found.end_mm])
-            low, high = ends.min(axis=0), ends.max(axis=0)
-        else:
-            header = mask_header(case.lumen)
-            corners = corners_mm(header.grid)
-            low, high = corners.min(axis=0), corners.max(axis=0)
-    except LoadError as error:
-        yield str(error)
-        return
-
-    def away_mm(point: ArrayLike) -> float:
-        return float(np.linalg.norm(np.maximum(np.maximum(low - point, np.asarray(point) - high), 0.0)))
-
-    away = away_mm(case.entry_mm)
-    if away > NEAR_MM:
-        spans = f"{low.round(1).tolist()} to {high.round(1).tolist()} mm in LPS"
-        fits = _fitting(case.entry_mm, lambda point: away_mm(point) == 0.0)
-        yield (
-            f"{case.lumen}: entry_mm {list(case.entry_mm)} lies {away:.0f} mm from the lumen, which spans {spans}; "
-            f"{fits or 'is one of them in RAS, or in another unit than mm?'}"
-        )
-
-
-def _fitting(point_mm: ArrayLike, within: Callable[[Array], bool]) -> str:
-    """What a point that lies outside would be within as; empty where nothing simple helps."""
-    point, turned = np.asarray(point_mm), np.array([-1.0, -1.0, 1.0])
-    ways = {"RAS? With its first two signs changed": point * turned, "metres? Times 1000": 1e3 * point}
-    return next((f"is it in {how}, {p.round(3).tolist()}, it lies there" for how, p in ways.items() if within(p)), "")
-
-
 def _told_problems(case: Case, count: int | None, absent: Container[Path]) -> list[str]:
     """What is wrong with the roll, the truth, the projections and another simulator's wires. count : of the frames."""
     problems = []
@@ -198,7 +156,7 @@ def entry_problems(case: Case, scans: Scans) -> list[str]:
         index = header.grid.to_index(points)
         for point, voxel in zip(points, index, strict=True):
             if np.any(voxel < -0.5) or np.any(voxel > np.array(header.shape) - 0.5):
-                fits = _fitting(point, lambda p: bool(np.all(np.abs(header.grid.to_index(p) - middle) <= middle + 0.5)))
+                fits = fitting(point, lambda p: bool(np.all(np.abs(header.grid.to_index(p) - middle) <= middle + 0.5)))
                 corners = header.grid.to_mm([[0, 0, 0], [n - 1 for n in header.shape]]).round(1).tolist()
                 problems.append(
                     f"{name} {list(point)} lies outside the scan (voxel {voxel.round(1).tolist()} of "

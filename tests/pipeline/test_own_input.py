@@ -10,6 +10,7 @@ import tracemalloc
 from collections.abc import Callable
 from contextlib import nullcontext
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -30,6 +31,7 @@ from pipeline.segment.config import SegmentConfig
 from pipeline.segment.given import given_lumen
 from pipeline.status import InputError
 from pipeline.study.manifest import read_manifest
+from pipeline.study.own_lumen import lumen_problems
 from pipeline.study.parameters import read_parameters
 from pipeline.study.settings import SettingsError, parse_assignment, read_settings
 from reports.export import write_markups_curve, write_polyline_vtp, write_surface_vtp
@@ -162,6 +164,23 @@ def test_a_label_that_a_file_cannot_have_is_seen_in_its_header(tmp_path, label, 
     labels(tmp_path / "seg.nrrd", np.zeros((4, 4, 4), np.uint8), 0.3, np.zeros(3))
     with pytest.raises(LoadError, match=said):
         mask_header(Mask(tmp_path / "seg.nrrd", label=label))
+
+
+def test_a_label_map_that_cannot_be_used_is_seen_before_a_run(tmp_path):
+    """`check` found nothing, and the run computed every other case before this one failed."""
+    distance, voxel, origin = capsule()
+    entry, path = origin + voxel * np.argwhere(distance == distance.min())[0], tmp_path / "lumen.nrrd"
+
+    def problems(values):
+        labels(path, values.astype(np.uint8), voxel, origin)
+        case = Mock(entry_mm=tuple(entry.tolist()), entry_sigma_mm=None)
+        return list(lumen_problems(case, Mask(path), SegmentConfig().least_voxels))
+
+    assert problems(distance < 0) == []
+    (several,) = problems(np.where(distance < 0, 2, 0) + (distance > 0.7))
+    assert "got 3 different values, 0, 1, 2" in several
+    (inverted,) = problems(distance > 0.7)
+    assert "has no voxel of the lumen within 1.5 mm, which spans" in inverted
 
 
 @pytest.mark.parametrize("top", [1.0, 255.0])

@@ -130,7 +130,9 @@ def straight_on(clues: Clues, depth_mm: float, _seen: PredictorInputs) -> Array:
     return to_length(np.array([clues.clamp.entry_mm, clues.clamp.entry_mm + clues.clamp.direction]), depth_mm)
 
 
-def test_a_metric_and_a_predictor_from_outside(as_before: None, tmp_path: Path) -> None:
+def test_a_metric_and_a_predictor_from_outside(
+    as_before: None, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     study, out = tmp_path / "study", tmp_path / "out"
     assert main(["synth", "bend", "-o", str(study), "--frames", "3", "--size", "64"]) == 0
     words = ["run", str(study / "manifest.toml"), "-o", str(out), "--no-cache"]
@@ -151,3 +153,8 @@ def test_a_metric_and_a_predictor_from_outside(as_before: None, tmp_path: Path) 
     page = (out / "cases" / "bend" / "report.html").read_text(encoding="utf-8")
     assert "near_<wbr>share" in page
     assert meaning in page
+    tables = [(out / name).read_bytes() for name in ("summary.csv", "overall.csv")]
+    ERRORS._drop(ERRORS["near_share"])
+    assert main(["report", str(out)]) == 2
+    assert f"near_share was registered by {__name__}, which is not loaded here" in capsys.readouterr().err
+    assert tables == [(out / name).read_bytes() for name in ("summary.csv", "overall.csv")], "its column was dropped"

@@ -31,6 +31,7 @@ from pipeline.run.stages.compare import _trusted_before
 from pipeline.run.stages.known import Frame
 from pipeline.simulate import wall_of
 from pipeline.status import FrameStatus
+from pipeline.study import own_lumen
 from reports import tables
 from reports.colours import TRACED, TRUE, rgb
 from reports.frames_file import read_scan
@@ -297,12 +298,20 @@ def with_lumen(study: Path, folder: Path, labels: np.ndarray, like: sitk.Image) 
     return folder
 
 
-def test_a_lumen_that_lies_elsewhere_is_what_fails(study: Path, finished: Path, tmp_path: Path) -> None:
-    """A mask that lost its scan's origin: every frame failed, and a wire that nobody saw was named for it."""
+def test_a_lumen_that_lies_elsewhere_is_what_fails(
+    study: Path, finished: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A mask that lost its scan's origin: every frame failed, and a wire that nobody saw was named for it.
+
+    A run says so before it computes anything, or, of a map of very many voxels, at the latest in its case.
+    """
     like = sitk.ReadImage(str(finished / "cases" / "bifurcation" / "view" / "lumen.seg.nrrd"))
     labels = sitk.GetArrayFromImage(like)
     like.SetOrigin((0.0, 0.0, 0.0))
     folder = with_lumen(study, tmp_path / "study", labels, like)
+    assert run(folder, tmp_path / "out", *QUICK) == 2
+    assert "has no voxel of the lumen within 1.5 mm, which spans" in capsys.readouterr().err
+    monkeypatch.setattr(own_lumen, "MOST_VOXELS", 0)
     assert run(folder, tmp_path / "out", *QUICK) == 1
     assert set(errors_of(tmp_path / "out")["status"]) == {"segment_failed"}
     assert "outside the given lumen, which spans" in (tmp_path / "out" / "failures.csv").read_text(encoding="utf-8")
@@ -600,6 +609,7 @@ def test_own_curves_are_held_against_the_wires_that_are_seen(study: Path, finish
     (text,) = said[1]
     assert "frame 0: " in text
     assert "mm longer" in text
+    assert "roll" not in " ".join(result["warnings"]), "it was said of the roll, fitted to which these curves were met"
 
 
 def test_results_do_not_depend_on_workers_or_shards(short: Path, tmp_path: Path) -> None:

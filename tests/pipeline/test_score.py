@@ -9,6 +9,7 @@ import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import cast
+from unittest.mock import Mock
 from xml.etree import ElementTree
 
 import h5py
@@ -25,7 +26,7 @@ from pipeline.load.vtk import read_vtk_points
 from pipeline.load.wires import numbered_frames, read_wires
 from pipeline.model import Curve, OtherWire, arc_length
 from pipeline.run.stages.known import Frame
-from pipeline.run.stages.others import _aside
+from pipeline.run.stages.others import _aside, of_their_run
 from pipeline.simulate.others import begun, not_to_depth, numbered_otherwise, oddity, out_of_order, tightest_bend
 from pipeline.status import InputError
 from pipeline.study.others import found_for, named
@@ -423,6 +424,17 @@ def test_a_wire_that_its_own_run_refused_has_failed(known: Known, tmp_path: Path
     assert [*table["status"]] == [f["status"] if f["stage"] else "ok" for f in own]
     assert "under_resolved" in [*table["status"]]
     assert "frames.h5#1: a joint is turned by" in str(result["failures"])
+
+
+def test_wires_of_a_run_bring_its_warnings(tmp_path: Path) -> None:
+    """A roll that a run was warned of was a score of its folder without a warning: statuses alone came along."""
+    (tmp_path / "result.json").write_text(json.dumps({"warnings": ["turned by -30 degrees", "few points"]}))
+    wires, log = [Source(tmp_path / "frames.h5")], Mock(warnings=["few points"])
+    assert of_their_run(Mock(**{"case.simulated.files": wires}, log=log)) == [
+        "in the run that made these wires: turned by -30 degrees"
+    ]
+    assert of_their_run(Mock(**{"case.simulated.files": [Source(tmp_path / "wires.h5")]}, log=log)) == []
+    assert of_their_run(Mock(**{"case.simulated": None}, log=log)) == []
 
 
 @pytest.mark.parametrize("frame", ['{"stage": "simulate"}', '{"frame": null}', '{"frame": 0, "status": 5}'])

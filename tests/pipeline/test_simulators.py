@@ -6,6 +6,7 @@ import json
 import shutil
 from collections.abc import Callable
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pandas as pd
@@ -122,6 +123,20 @@ def test_who_is_nearer_is_said_for_the_best_and_every_other_one(compared: Path) 
     alone = [{"simulator": n, "frames": 1, "frames_ok": 1, "rms_mm": mm} for n, mm in (("a", 1.0), ("b", 1.2))]
     told = "a is not shown to be nearer than b: on 1 frame b lies 1.20 times as far from the traced wires (withheld)."
     assert nearer([*alone, row]) == [told]
+
+
+def test_simulators_of_the_same_errors_are_a_copy_on_the_page_too(tmp_path: Path) -> None:
+    """The terminal asked whether one is a copy; the page said "not shown to be nearer: 1.00 times as far"."""
+    made = {name: write_tree(tmp_path / name, even(mm)) for name, mm in (("b", 0.3), ("best", 0.2))}
+    made["copy"] = shutil.copytree(made["b"], tmp_path / "copy")
+    said = write_comparison(tmp_path / "b", made)
+    page = render_simulators(tmp_path / "b").read_text(encoding="utf-8")
+    told = f"copy and b have the same error at every point of all {CASES * len(DEPTHS)} frames: is one a copy?"
+    assert told in said
+    assert f"<li>{told}</li>" in page
+    assert page.count("is one a copy?") == 1
+    write_comparison(tmp_path / "b", {"b": made["b"], "copy": made["copy"]})
+    assert "1.00 times as far" not in render_simulators(tmp_path / "b").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(
@@ -399,7 +414,7 @@ def test_the_same_twice_is_a_tie(tmp_path: Path) -> None:
     both = {name: write_tree(tmp_path / name, even(0.2)) for name in ("wireval", "another")}
     said = write_comparison(tmp_path, both)
     assert set(pd.read_csv(tmp_path / "where.csv")["lead"].dropna()) == {"tie"}
-    assert "another / wireval, on 24 frames: 1.000 (95 %: 1.000 to 1.000" in said[0]
+    assert said[0] == "another and wireval have the same error at every point of all 24 frames: is one a copy?"
 
 
 def test_the_page(compared: Path) -> None:
@@ -507,5 +522,17 @@ def test_insertions_that_look_like_one_have_no_green_badge(tmp_path: Path) -> No
 def test_the_frame_of_a_share_is_told_apart_from_it(monkeypatch: pytest.MonkeyPatch, wires: int, said: str) -> None:
     """It was "in frame 5 71 % of the wire"."""
     monkeypatch.setattr(others, "_clearance", lambda _known, points: np.full(len(points), 9.0))
-    (text,) = others._outside(Known(), dict.fromkeys(range(wires), np.eye(3)), 0.18)
+    case = Mock(**{"wire.radius_mm": 0.18})
+    (text,) = others._outside(Known(), dict.fromkeys(range(wires), np.eye(3)), case)
     assert text.startswith(f"{said} of the wire lies outside the lumen")
+
+
+def test_a_tip_beyond_the_wall_is_told_however_short_it_is() -> None:
+    """The last 0.9 mm of a wire lay 0.9 mm outside a vessel of 2 mm in every frame, ok and without a warning."""
+    inside = np.full(100, -0.5)
+    tips = {n: np.append(inside, [0.4, mm]) for n, mm in enumerate((0.5, 0.7, 0.9))}
+    (text,) = others._through_wall(tips, 0.54)
+    assert text.startswith("2 frames, the worst is frame 2: the wire lies up to 0.90 mm beyond the lumen's wall, its")
+    (text,) = others._through_wall({7: np.append(tips[2], inside)}, 0.54)
+    assert text.startswith("frame 7: the wire lies up to 0.90 mm beyond the lumen's wall (expected 0.54 mm at most)")
+    assert not others._through_wall(tips, 1.0)

@@ -7,8 +7,9 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from reports.doubts import Doubt, weightiest_first
-from reports.verdict import badge, in_short, of_these_alone, unscored, verdict
+from reports.doubts import OFF_THE_SCANS, Doubt, weightiest_first
+from reports.unscored import unscored
+from reports.verdict import badge, headline, in_short, of_these_alone, remarks, verdict
 from reports.what_next import next_command, typed, warned, worst_frames
 from reports.worse import worse_sentence
 from tests.reports.fake_results import FakeCase, write_run
@@ -60,7 +61,7 @@ def test_a_skill_of_one_insertion_says_nothing_of_others() -> None:
     """Three insertions were "not shown to be better"; with one group for them the same wires were better, full stop."""
     row = {"skill_strongest": 0.988, "strongest_null": "previous"}
     alone = "interval withheld: 1 insertion, at least 3 needed"
-    assert of_these_alone(row | {"interval": alone}).startswith("The skill is of these insertions alone")
+    assert of_these_alone(row | {"interval": alone}).startswith("The skill tells of these insertions alone")
     assert not of_these_alone(row | {"interval": "wide: 3 insertions"})
     assert not of_these_alone(row | {"interval": alone, "skill_strongest": -0.1}), "that is worse, of whatever"
 
@@ -213,6 +214,42 @@ def test_warnings_stand_before_the_word_better(warnings: tuple[str, ...], text: 
 def test_a_warning_against_an_input_is_none_of_the_last() -> None:
     """The terminal and a page show five: behind these a wrong roll was one of "3 more warnings"."""
     assert weightiest_first(["a", "b", ROLLED, "c"]) == [ROLLED, "a", "b", "c"]
+
+
+def test_traces_off_the_scans_come_first_and_no_roll_is_advised() -> None:
+    """Mirrored own traces, met with a fitted roll, had a green ok; a warning of the roll stood above theirs."""
+    off = f"the manifest's {OFF_THE_SCANS} (frame 0: 0.68 mm off): check which curve belongs to which frame"
+    row = {"rms_mm": 2.0, "null_roll_unknown_rms_mm": 0.82, "skill_strongest": -1.0, "strongest_null": "roll_unknown"}
+    doubt = Doubt(warnings=weightiest_first(["few points", ROLLED, f"a: {off}"]))
+    assert list(doubt.warnings) == [f"a: {off}", ROLLED, "few points"]
+    said = verdict(row, doubt=doubt)
+    found = "a: the manifest's own curves are not where the scans show the wire"
+    assert f"The weightiest of 3 warnings: {found}. The wire is worse" in said, "what to check is among the warnings"
+    assert "With an unknown roll" not in said
+    assert not remarks(row, doubt=doubt)
+    two_points = Doubt(warnings=["the wires have few points (frame 0: 7.8 mm in one line)"])
+    assert not remarks(row, "mine", two_points), "a wire of two points shows no roll, and few points are the cause"
+    good = badge("ok", True, row | {"skill_strongest": 0.9}, Doubt(warnings=[off]))
+    assert (good["text"], good["look"]) == ("ok, 1 warning", "poor")
+
+
+def test_a_page_begins_with_three_sentences_and_says_each_definition_once() -> None:
+    """Ten lines, a whole screen of a telephone, stood before the first number."""
+    row = {"rms_mm": 0.36, "trace_sigma_mm": 0.3, "share_beyond_2u": 0.4, "frames": 4, "frames_ok": 3}
+    row |= {
+        "skill_strongest": 0.5,
+        "skill_strongest_low": -0.1,
+        "strongest_null": "another",
+        "interval": "wide: 3 insertions",
+    }
+    said, more = headline(row, defined=False)
+    assert said.endswith(
+        "On these frames it is not shown to be better (skill 0.500, its interval reaches -0.100) than "
+        "the predictor 'another insertion'."
+    )
+    assert len(more) == 4
+    assert verdict(row).count(". ") > 4
+    assert all(text in verdict(row) for text in more)
 
 
 def test_a_wrong_roll_is_guessed_at() -> None:

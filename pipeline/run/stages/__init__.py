@@ -10,6 +10,7 @@ from pipeline.run.log import Stage
 from pipeline.run.stages.compare import compare_frames
 from pipeline.run.stages.known import Context, Known
 from pipeline.run.stages.load import open_case
+from pipeline.run.stages.others import of_their_run
 from pipeline.run.stages.segment import scan_at_entry, segment_vessel
 from pipeline.run.stages.simulate import simulate_frames
 from pipeline.run.stages.trace import trace_frames
@@ -38,4 +39,5 @@ def run_stages(run: Context) -> Known:
         except StageError as error:
             unseen = scan_at_entry(run, known) if known.lumen is None else None
             return replace(known.failed(stage, error), at_entry=unseen)
+    run.log.warnings += of_their_run(run)
     return known

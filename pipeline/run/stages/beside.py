@@ -13,6 +13,7 @@ from pipeline.run.stages.known import Frame
 from pipeline.status import FrameStatus
 from pipeline.trace.config import TraceConfig
 from reports.case_files import listed
+from reports.doubts import OFF_THE_SCANS
 
 OFF_VOXELS, OFF_SIGMAS = 0.75, 3.0
 """Median distance from a traced wire, in voxels and in its own standard deviations, above which a curve is not its."""
@@ -46,7 +47,7 @@ def beside_what_is_seen(
     each = listed([f"frame {index}: {what}" for index, what in said.items()], MOST_NAMED)
     found = [each] * bool(said) + (_together(both, voxel_mm) if 2 * len(said) < len(both) else [])
     warnings = [
-        f"the manifest's own curves are not where the scans show the wire ({what}): check which curve belongs to "
+        f"the manifest's {OFF_THE_SCANS} ({what}): check which curve belongs to "
         "which frame, its units and LPS; without the key traces the scans are traced"
         for what in found
     ]

@@ -33,7 +33,7 @@ def clamp_of(run: Context, known: Known) -> Clamp:
     """The clamp of the simulation: estimated from the scans, or the manifest's."""
     given, prior, voxel_mm = manifest_clamp(run, known)
     seen = seen_in(known.frames) if trusted(known.frames) else []
-    passed = beside([frame.curve for frame in seen], given, prior.sigma_mm, voxel_mm)
+    passed = beside([frame.curve for frame in seen], given, prior.sigma_mm, voxel_mm) if not known.off_the_scans else ""
     if run.config.simulate.entry == "manifest":
         run.log.warnings += [passed] * bool(passed)
         return given
@@ -45,7 +45,8 @@ def clamp_of(run: Context, known: Known) -> Clamp:
     if prior.sigma_mm < UNKNOWN_VOXELS * voxel_mm and not departed(given, clamp, prior.sigma_mm, 0.0):
         clamp = replace(clamp, warning="; ".join(filter(None, (clamp.warning, passed))))
     run.log.assumptions += [clamp.note] * bool(clamp.note)
-    run.log.warnings += [clamp.warning] * bool(clamp.warning)
+    # of traces that lie off the scans no entry or roll can be told: these are to be mended first
+    run.log.warnings += [clamp.warning] * (bool(clamp.warning) and not known.off_the_scans)
     return clamp
 
 

@@ -55,7 +55,8 @@ def _simulated_otherwise(
     While helpers simulate, this process finds what the clues of all frames share.
     """
     ways = variants_of(run, known)
-    told = run.case.simulated is None  # another simulator's wires say nothing about what this one is told
+    # another simulator's wires say nothing about what this one is told, nor do traces that lie off the scans
+    told = run.case.simulated is None and not known.off_the_scans
 
     def one(number: int, _earlier: object) -> Any:
         if not number:

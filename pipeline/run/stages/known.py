@@ -140,6 +140,7 @@ class Known:
     """What is known of a case so far.
 
     lumen_doubt : what the scan says against a given lumen that is far off; empty where it is not.
+    off_the_scans : whether own traces lie off the wires that the scans show: nothing is then told from the traces.
     clamp, segment_mm : what was simulated with.     clues : see ``clues_of``.
     sources, entries : rows of budget.csv and entries.csv.
     ends_rank : of the real insertion in the budget's ensemble (see ``budget.joint``).
@@ -149,6 +150,7 @@ class Known:
     scans: Scans | None = None
     lumen: Lumen | None = None
     lumen_doubt: str = ""
+    off_the_scans: bool = False
     clamp: Clamp | None = None
     clues: Clues | None = None
     segment_mm: float = float("nan")

@@ -8,11 +8,12 @@ import numpy as np
 
 from pipeline.arrays.polyline import at_arc, resample, samples
 from pipeline.compare.metrics import rms
-from pipeline.load.wires import OtherFile, read_wires
+from pipeline.load.wires import OtherFile, read_wires, warned_beside
 from pipeline.model import Array, OtherWire, Wire, arc_length
 from pipeline.run.stages.in_itself import not_in_itself
 from pipeline.run.stages.known import Context, Frame, Known
 from pipeline.run.stages.own_curves import rough
+from pipeline.segment.opened import may_lie_outside_mm
 from pipeline.simulate import wall_of
 from pipeline.simulate.others import (
     MIRROR,
@@ -25,6 +26,7 @@ from pipeline.simulate.others import (
     tightest_bend,
 )
 from pipeline.status import FrameStatus
+from pipeline.study.manifest import Case
 from reports.case_files import counted
 from solver.self_contact import self_overlap_mm
 
@@ -33,6 +35,8 @@ LEAST_ASIDE_MM, MOST_LEFT = 0.5, 0.35
 """Shift of all wires against the traced ones from which it is told, and the share of it that may be left without it."""
 MOST_OUTSIDE = 0.2
 """Share of a wire outside the lumen from which on it is asked whether its x and y are turned."""
+FAR_RADII = 3.0
+"""How many of its radii a wire's axis may lie beyond the wall unsaid: a tip 0.9 mm beyond it, in all frames, was."""
 
 
 def frames_of_others(run: Context, known: Known) -> tuple[Frame, ...]:
@@ -50,10 +54,18 @@ def frames_of_others(run: Context, known: Known) -> tuple[Frame, ...]:
     wires = {f.index: f.simulated.joints_mm for f in frames if f.simulated is not None}
     voxel_mm = float(min(known.vessel.distance.spacing_mm))
     log.warnings += _in_another_order(frames)
-    log.warnings += [*_outside(known, wires, case.wire.radius_mm), *_aside(frames)]
+    log.warnings += [*_outside(known, wires, case), *_aside(frames)]
     log.warnings += rough(wires, voxel_mm, "the simulated wires", "give a point every millimetre")
     log.warnings += _kinked(wires, case.wire)
     return tuple(frames)
+
+
+def of_their_run(run: Context) -> list[str]:
+    """What another run was warned of whose wires these are, where this one was not: a roll that it found wrong, say."""
+    if run.case.simulated is None or not run.goes_to("simulate"):
+        return []
+    said = (text for text in warned_beside(run.case.simulated.files) if text not in run.log.warnings)
+    return [f"in the run that made these wires: {text}" for text in said]
 
 
 def _listed(files: Sequence[OtherFile]) -> str:
@@ -151,15 +163,32 @@ def _aside(frames: Sequence[Frame]) -> list[str]:
     ]
 
 
-def _outside(known: Known, wires: Mapping[int, Array], radius_mm: float) -> list[str]:
+def _outside(known: Known, wires: Mapping[int, Array], case: Case) -> list[str]:
     """Warnings where wires (n, 3), by frame, lie outside the lumen, and whether they would not with x and y turned."""
-    outside = {n: np.mean(_clearance(known, wire) > radius_mm) for n, wire in wires.items()}
+    radius_mm, beyond = case.wire.radius_mm, {n: _clearance(known, wire) for n, wire in wires.items()}
+    outside = {n: np.mean(mm > radius_mm) for n, mm in beyond.items()}
     outside = {n: share for n, share in outside.items() if share > MOST_OUTSIDE}
     if not outside:
-        return []
+        may = may_lie_outside_mm(float(min(known.vessel.distance.spacing_mm)), case.wall.stiffness_N_mm2)
+        return _through_wall(beyond, max(FAR_RADII * radius_mm, may))
     worst = max(outside, key=lambda n: float(outside[n]))
     turned = Counter(np.mean(_clearance(known, wires[n] * MIRROR) > radius_mm) < 0.5 * outside[n] for n in outside)
     hint = "; with x and y turned most would not: are they RAS?" if turned[True] > turned[False] else ""
     what = f"{100 * outside[worst]:.0f} % of the wire lies outside the lumen by more than its radius"
     several = f"{counted(len(outside), 'frame')}, the worst is " * (len(outside) > 1)
     return [f"{several}frame {worst}: {what}{hint}"]
+
+
+def _through_wall(beyond: Mapping[int, Array], allowed_mm: float) -> list[str]:
+    """A warning where a part of a wire, as its tip, lies beyond the wall. beyond : by frame, mm, in equal steps."""
+    through = {n: mm for n, mm in beyond.items() if mm.max() > allowed_mm}
+    if not through:
+        return []
+    worst = max(through, key=lambda n: float(through[n].max()))
+    mm = through[worst]
+    several = f"{counted(len(through), 'frame')}, the worst is " * (len(through) > 1)
+    tip = f", its tip {mm[-1]:.2f} mm" * bool(mm[-1] > allowed_mm)
+    return [
+        f"{several}frame {worst}: the wire lies up to {mm.max():.2f} mm beyond the lumen's wall{tip} (expected "
+        f"{allowed_mm:.2f} mm at most): has it left the vessel, or is this another lumen than its own?"
+    ]

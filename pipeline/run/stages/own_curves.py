@@ -19,6 +19,7 @@ from pipeline.simulate.others import begun, oddity
 from pipeline.status import FrameStatus
 from pipeline.trace import of_length
 from reports.case_files import listed
+from reports.doubts import IN_ONE_LINE
 from solver import Grid
 
 OUTSIDE_VOXELS, MOST_OUTSIDE = 2.0, 0.25
@@ -107,7 +108,7 @@ def rough(curves: Mapping[int, Array], voxel_mm: float, whose: str, mend: str) -
         return []
     return [
         f"{whose} have few points: straight lines between them pass beside a smooth wire "
-        f"({listed(coarse, MOST_NAMED)}; {CORNER_VOXELS * voxel_mm:.2f} mm would do): {mend}"
+        f"({listed(coarse, MOST_NAMED)}; they may pass {CORNER_VOXELS * voxel_mm:.2f} mm beside it): {mend}"
     ]
 
 
@@ -121,9 +122,9 @@ def _cut(points_mm: Array, allowed_mm: float) -> str:
     steps = np.linalg.norm(np.diff(points_mm, axis=0), axis=1)
     length, longest = float(steps.sum()), float(steps.max())
     if longest > LONE * length:
-        return f"{length:.1f} mm in one line" if longest**2 / (8.0 * UNSEEN_RADIUS_MM) > allowed_mm else ""
+        return f"{length:.1f} {IN_ONE_LINE}" if longest**2 / (8.0 * UNSEEN_RADIUS_MM) > allowed_mm else ""
     mm = corner_mm(points_mm)
-    return f"{mm:.2f} mm" if mm > allowed_mm else ""
+    return f"{mm:.2f} mm beside it" if mm > allowed_mm else ""
 
 
 def zigzag(points_mm: Array) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 from pipeline.arrays.cores import on_cores, side_by_side
 from pipeline.arrays.grids import corners_mm, indices_of
 from pipeline.load import Crop
-from pipeline.load.lumens import read_lumen
+from pipeline.load.lumens import LOOK_AT, meant_within_mm, read_lumen
 from pipeline.model import Array, Lumen, Volume
 from pipeline.run.projections import slabs
 from pipeline.run.stages.known import Context, Known
@@ -78,11 +78,6 @@ def _loading(run: Context, reference: bool) -> Callable[..., Lumen]:
     return both
 
 
-FAR_OUTSIDE, FAR_OUTSIDE_MM = 2.0, 1.5
-"""Voxels and mm outside a given lumen, the larger counts, from which an entry was not meant for it: one in its wall is
-the solver's to judge."""
-
-
 def _require_entry(run: Context, lumen: Lumen) -> None:
     """StageError where the user's own lumen is not where the wire enters: wires would be missed, not the lumen."""
     grid = lumen.distance
@@ -90,14 +85,13 @@ def _require_entry(run: Context, lumen: Lumen) -> None:
         do = "check whether each of its triangles is there twice, or whether it is much thinner than 0.3 mm"
         raise failed("the given lumen encloses nothing", "a lumen that the wire enters", do)
     out = float(outside_mm(grid, np.array([run.case.entry_mm]))[0])
-    if out > max(FAR_OUTSIDE * float(np.max(grid.spacing_mm)), FAR_OUTSIDE_MM, 2.0 * (run.case.entry_sigma_mm or 0.0)):
+    if out > meant_within_mm(float(np.max(grid.spacing_mm)), run.case.entry_sigma_mm):
         low, high = (corner.round(1).tolist() for corner in _box_of(lumen))
         raise failed(
             f"entry_mm {list(run.case.entry_mm)} lies {out:.1f} mm or more outside the given lumen, which spans {low} "
             f"to {high} mm in LPS",
             "a lumen that the wire enters",
-            "check its axes (LPS or RAS), its grid (was the scan's geometry kept?), its unit, which label is meant, "
-            "and whether it reaches to the entry",
+            LOOK_AT,
         )
 
 

@@ -85,7 +85,7 @@ def trace_frames(run: Context, known: Known) -> Known:
     run.log.assumptions += assumed
     run.log.warnings += doubtful + of_drift({f.index: f.curve for f in frames if f.curve is not None})
     frames = [_first_said(frame, known.lumen_doubt) for frame in frames]
-    return _with_room(run, known, frames, elsewhere)
+    return _with_room(run, replace(known, off_the_scans=bool(off_scans)), frames, elsewhere)
 
 
 def _in_step(run: Context, frames: list[Frame], voxel_mm: float) -> list[Frame]:

@@ -1,0 +1,92 @@
+"""What is wrong with the user's own lumen before anything is computed: it cannot be read, or lies off the entry."""
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pipeline.arrays.grids import corners_mm
+from pipeline.load import Header, LoadError, Source
+from pipeline.load.lumens import LOOK_AT, meant_within_mm, read_lumen
+from pipeline.load.masks import mask_header
+from pipeline.model import Array, Branches, Shapes, Volume
+from pipeline.study.manifest import Case
+
+NEAR_MM = 20.0
+"""An entry further than this from the box of the own lumen was not meant for it."""
+MOST_VOXELS = 400**3
+"""Voxels of a label map up to which they are read, in half a second; of a larger one the header alone is."""
+
+
+def lumen_problems(case: Case, lumen: Source, least_voxels: int) -> Iterator[str]:
+    """What is wrong with a lumen; in a case that was found by its run alone, all others were computed before."""
+    try:
+        found = _read(lumen, least_voxels)
+    except LoadError as error:
+        yield str(error)
+        return
+    ends = _ends_mm(found)
+    low, high = ends.min(axis=0), ends.max(axis=0)
+
+    def away_mm(point: ArrayLike) -> float:
+        return float(np.linalg.norm(np.maximum(np.maximum(low - point, np.asarray(point) - high), 0.0)))
+
+    away = away_mm(case.entry_mm)
+    if away > NEAR_MM:
+        fits = fitting(case.entry_mm, lambda point: away_mm(point) == 0.0)
+        do = fits or "is one of them in RAS, or in another unit than mm?"
+        yield f"{lumen}: {_entry(case)} lies {away:.0f} mm from the lumen, which spans {_box(low, high)}; {do}"
+    elif isinstance(found, Volume):
+        within = meant_within_mm(float(np.max(found.spacing_mm)), case.entry_sigma_mm)
+        if not _any_near(found, np.array(case.entry_mm), within):
+            yield (
+                f"{lumen}: {_entry(case)} has no voxel of the lumen within {within:.1f} mm, which spans "
+                f"{_box(low, high)}; expected a lumen that the wire enters; {LOOK_AT}"
+            )
+
+
+def _read(lumen: Source, least_voxels: int) -> Branches | Shapes | Volume | Header:
+    """The lumen; of a label map of very many voxels its header."""
+    if lumen.path.name.lower().endswith((".swc", ".mrk.json", ".stl", ".vtp")):
+        return read_lumen(lumen, least_voxels)
+    header = mask_header(lumen)
+    return header if np.prod(header.shape, dtype=float) > MOST_VOXELS else read_lumen(lumen, least_voxels)
+
+
+def _ends_mm(found: Branches | Shapes | Volume | Header) -> Array:
+    """Points (n, 3) that span the lumen, LPS mm; of a header those of its grid."""
+    if isinstance(found, Shapes):
+        return found.points_mm
+    if isinstance(found, Branches):
+        return np.concatenate([found.start_mm, found.end_mm])
+    if isinstance(found, Header):
+        return corners_mm(found.grid)
+    inside = found.values >= 0.5
+    lines = [np.flatnonzero(inside.any(axis=tuple({0, 1, 2} - {axis}))) for axis in range(3)]
+    ends = np.meshgrid(*[(line[0], line[-1]) for line in lines], indexing="ij")
+    return found.to_mm(np.stack(ends, -1).reshape(-1, 3))
+
+
+def _any_near(lumen: Volume, point_mm: Array, within_mm: float) -> bool:
+    """Whether a voxel of the lumen, to its corners, lies within a distance of a point; those around it are asked."""
+    half = float(np.linalg.norm(lumen.spacing_mm)) / 2.0
+    index, reach = lumen.to_index(point_mm[None])[0], (within_mm + half) / lumen.spacing_mm
+    low = np.clip(np.floor(index - reach).astype(int), 0, lumen.shape)
+    high = np.clip(np.ceil(index + reach).astype(int) + 1, 0, lumen.shape)
+    near = np.argwhere(lumen.values[tuple(map(slice, low, high))] >= 0.5) + low
+    return bool(np.any(np.linalg.norm(lumen.to_mm(near) - point_mm, axis=1) <= within_mm + half))
+
+
+def _entry(case: Case) -> str:
+    return f"entry_mm {list(case.entry_mm)}"
+
+
+def _box(low: Array, high: Array) -> str:
+    return f"{low.round(1).tolist()} to {high.round(1).tolist()} mm in LPS"
+
+
+def fitting(point_mm: ArrayLike, within: Callable[[Array], bool]) -> str:
+    """What a point that lies outside would be within as; empty where nothing simple helps."""
+    point, turned = np.asarray(point_mm), np.array([-1.0, -1.0, 1.0])
+    ways = {"RAS? With its first two signs changed": point * turned, "metres? Times 1000": 1e3 * point}
+    return next((f"is it in {how}, {p.round(3).tolist()}, it lies there" for how, p in ways.items() if within(p)), "")
