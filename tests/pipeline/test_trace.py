@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 from scipy.spatial import cKDTree
+from scipy.special import ndtr
 
 from pipeline.compare.metrics import point_to_curve
 from pipeline.model import Curve, Lumen, Volume, arc_length
@@ -331,6 +332,18 @@ def test_a_crop_of_the_frame_and_a_lumen_on_another_lattice_do():
     curve = trace(Volume(crop.values, crop.spacing_mm, crop.origin_mm), other, entry, direction,
                   reference=Volume(still.values, still.spacing_mm, still.origin_mm))  # fmt: skip
     assert point_to_curve(curve.points_mm, wire)[0].mean() < 0.15 * VOXEL
+
+
+def test_a_reference_between_whose_voxels_the_frame_s_lie_leaves_no_lines_at_the_wall():
+    """Half a voxel off each way: trilinear grey left 5 % of the contrast there, marks as bright as a thin wire."""
+    index, noise = np.indices((30, 24, 40), np.float32), np.random.default_rng(0).normal(size=(2, 30, 24, 40))
+    distance, other = (np.hypot(index[0] + by - 14.0, index[1] + by - 11.0) - 5.0 for by in (0.0, 0.5))
+    reference = Volume(1000.0 * ndtr(-distance / 0.7) + noise[0])
+    frame = Volume(1000.0 * ndtr(-other / 0.7) + noise[1], origin_mm=np.full(3, 0.5))
+    lumen = Lumen(Grid(distance.astype(np.float32)), levels={"scanner_blur_mm": 0.7})
+    image = subtracted(frame, lumen, reference)
+    left = image.grey[image.region.box.values < 1.0]
+    assert np.abs(left - np.median(left)).max() < 30.0
 
 
 def test_a_frame_without_wire_is_a_named_status():
