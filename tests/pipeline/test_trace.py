@@ -22,7 +22,7 @@ from pipeline.status import FrameStatus
 from pipeline.trace import doubts, explain, of_catheter, of_length, trace
 from pipeline.trace.attempt import EntryPose, _fitted, dense, misfit, prolonged
 from pipeline.trace.config import TraceConfig
-from pipeline.trace.elsewhere import brightest_line
+from pipeline.trace.elsewhere import DARK, brightest_line, passed_by_dark
 from pipeline.trace.knots import first_tube
 from pipeline.trace.region import _regions
 from pipeline.trace.rotation_plane import near_rotation_plane
@@ -96,6 +96,18 @@ def test_a_wrong_entry_is_told_where_the_brightest_line_is(has_reference):
     assert said == pytest.approx(away, abs=2 * VOXEL), "voxels of the line, a tenth of them"
     assert brightest_line(reference, None, wrong) is None, "a vessel without a wire has no such line"
     assert brightest_line(frame, reference, entry) is None, "a line that passes the entry is no news"
+
+
+def test_a_wire_that_is_darker_than_the_medium_is_called_dark():
+    """It was told to check that the frame shows a wire, which it did, at the entry."""
+    frame, reference, lumen = scans(8)
+    *_, entry, direction = vessel()
+    darker = replace(frame, values=2.0 * reference.values - frame.values)
+    curve = trace(darker, lumen, entry, direction, reference=reference)
+    assert curve.status is FrameStatus.NO_WIRE
+    assert curve.note.endswith(DARK)
+    assert not passed_by_dark(frame, reference, entry)
+    assert not passed_by_dark(reference, None, entry)
 
 
 @pytest.mark.parametrize(("cnr", "mean_bar", "tip_bar"), [(16, 0.05, 0.4), (8, 0.08, 0.7), (4, 0.15, 1.1)])
