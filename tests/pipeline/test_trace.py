@@ -368,6 +368,18 @@ def test_a_frame_without_wire_is_a_named_status():
     assert "expected" in curve.note
 
 
+@pytest.mark.parametrize("radius", [8.0, 17.0], ids=["8,000 voxels", "43,000"])
+def test_a_frame_of_another_phantom_is_told_in_lumens_of_any_size(radius):
+    """From 40,000 voxels on no two of those that were looked at were neighbours, and the hint was never given."""
+    x, y, z = np.indices((40, 40, 46), np.float32)
+    distance, noise = np.hypot(x - 19.5, y - 19.5) - radius, np.random.default_rng(0).normal(0.0, 2.0, (2, *x.shape))
+    empty = 300.0 * ndtr(-distance) + noise[0]
+    frame = Volume(300.0 * ndtr(-distance) + 60.0 * np.sin(x / 6.0) * np.sin(y / 5.0 + z / 9.0) + noise[1])
+    curve = trace(frame, Lumen(Grid(distance)), [19.5, 19.5, 0.5], [0.0, 0.0, 1.0], reference=Volume(empty))
+    assert curve.status is FrameStatus.NO_WIRE
+    assert "check that the reference is of this phantom" in curve.note
+
+
 def test_too_little_contrast_is_a_named_status_and_never_a_silent_error():
     for seed in range(3):
         curve, _ = tangles.run(seed, cnr=1.8, kind=0)
