@@ -18,6 +18,7 @@ from pipeline.register.shift import (
     METAL_VOXELS,
     StaticPoints,
     changes,
+    farthest,
     fit_motion,
     grey_at,
     inside,
@@ -43,7 +44,7 @@ SURE, LEAST_GAIN = 2.3, 0.04
 def slid(frame: Volume, s: StaticPoints, motion: Motion) -> tuple[Motion, float]:
     """The motion, moved along what the structures hardly show to where the frame fits best, if that is sure.
 
-    Also how far along it the frame fits as well, within its noise, voxels.
+    Also how far it may lie off at most where the frame fits as well, within its noise, voxels.
     """
     loose = 0.0
     for _ in range(ROUNDS):
@@ -78,7 +79,8 @@ def _power(s: StaticPoints, motion: Motion) -> tuple[Array, Array]:
 def _best_along(frame: Volume, s: StaticPoints, motion: Motion, axis: Array) -> tuple[Motion, float]:
     """The motion plus that share of ``axis`` with which the frame fits best; the same where that is not sure.
 
-    Also the distance (voxels) to the farthest place that fits as well.
+    Also how far from it (voxels) a point lies at most in places that fit as well. A place is where least squares
+    settle: what slides back from its offset is no other.
     """
 
     def settled(voxels: float) -> Motion:
@@ -97,7 +99,7 @@ def _best_along(frame: Volume, s: StaticPoints, motion: Motion, axis: Array) -> 
     best = int(np.argmin(square.mean(axis=1)))
     worse = square - square[best]  # point by point, as all places have the same noise
     sure = worse.mean(axis=1) / np.maximum(worse.std(axis=1) * np.sqrt(TOGETHER / max(1, worse.shape[1])), 1e-12)
-    loose = float(np.max(np.abs(OFFSETS_VOXELS - OFFSETS_VOXELS[best])[sure < SURE]))
+    loose = max(farthest(motions[k].after(motions[best]), s) for k in np.flatnonzero(sure < SURE))
     n = int(np.clip(best, 1, len(rest) - 2))
     a, b, _ = np.polyfit(OFFSETS_VOXELS[n - 1 : n + 2], square.mean(axis=1)[n - 1 : n + 2], 2)
     if not a > 0.0 or sure[here] < SURE or worse[here].mean() < LEAST_GAIN * square[here].mean():

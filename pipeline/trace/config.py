@@ -27,6 +27,6 @@ class TraceConfig:
     in_plane_deg: Annotated[float, Field(ge=0, le=90), Number] = 10.0
     """The cone's half angle: points whose tangent is nearer than this to the plane of rotation are flagged."""
     register: Literal["auto", "off"] = "auto"
-    """auto (frames are registered to the reference scan where the phantom moved) or off."""
+    """auto (frames are registered to the reference scan where the phantom moved) or off (a motion is told)."""
     register_skip_voxels: NonNegative = 0.1
     """A phantom that moved by less than this everywhere on the lumen's wall is taken not to have moved."""

@@ -1,4 +1,4 @@
-"""Where the brightest line near the entry lies, for a frame in which no line passes the entry itself."""
+"""Which lines lie near the entry, for a frame in which no bright line passes the entry itself."""
 
 from typing import NamedTuple
 
@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from pipeline.arrays.grids import spread
+from pipeline.arrays.grids import sampled, spread
 from pipeline.model import Array, Volume
+from solver.grid import Grid
 
 REACH_MM = 12.0
 """How far around the entry the line is looked for: a vessel's width and some."""
@@ -16,6 +17,10 @@ LEAST_SPREADS, LEAST_MM = 5.0, 4.0
 noises has a height of 5.7 to 8.1, the same vessel without wire 3.2."""
 BESIDE_MM = 1.0
 """Distance from the line beyond which the entry is not on it: a clamp may lie as far from the manifest's entry."""
+DARK = (
+    "a dark line passes entry_mm: if that is the wire, it is darker than the contrast medium, in which only brighter "
+    "ones are traced: scan with thinner medium, or without"
+)
 
 
 class Line(NamedTuple):
@@ -34,25 +39,40 @@ class Line(NamedTuple):
 def brightest_line(frame: Volume, reference: Volume | None, entry_mm: Array) -> Line | None:
     """The brightest line within ``REACH_MM`` of the entry; None without one, or where it passes the entry.
 
-    reference : the scan without wire in the frame's geometry, if there is one: bone is a line, too.
+    reference : the scan without wire, if there is one: bone is a line, too.
     """
+    line = _nearest(*_around(frame, reference, entry_mm), entry_mm)
+    return line if line and BESIDE_MM < line.distance_mm < REACH_MM else None
+
+
+def passed_by_dark(frame: Volume, reference: Volume | None, entry_mm: Array) -> bool:
+    """Whether the darkest line near the entry passes it: a wire, or its coat, that is darker than the medium."""
+    grey, box = _around(frame, reference, entry_mm)
+    line = _nearest(-grey, box, entry_mm)
+    return line is not None and line.distance_mm <= BESIDE_MM
+
+
+def _around(frame: Volume, reference: Volume | None, entry_mm: Array) -> tuple[NDArray[np.float32], Grid]:
+    """The frame's grey around the entry less the reference's, where that is seen; and the frame's part."""
     at, spacing = frame.to_index(entry_mm[None])[0], np.asarray(frame.spacing_mm, float)
     first = np.clip(np.floor(at - REACH_MM / spacing), 0, np.array(frame.shape) - 1).astype(int)
     stop = np.clip(np.ceil(at + REACH_MM / spacing) + 1, first + 1, frame.shape).astype(int)
-    box = tuple(slice(a, b) for a, b in zip(first, stop, strict=True))
-    grey = frame.values[box].astype(np.float32)
-    if reference is not None and reference.shape == frame.shape:
-        grey = grey - reference.values[box].astype(np.float32)
-    if min(grey.shape) < 3:
+    box = frame.crop(first, stop)
+    grey = box.values.astype(np.float32)
+    if reference is not None:
+        grey = np.nan_to_num(grey - sampled(reference, box, np.nan).values)
+    return grey, box
+
+
+def _nearest(grey: NDArray[np.float32], box: Grid, entry_mm: Array) -> Line | None:
+    """The point of the brightest line that is nearest to the entry; None without one."""
+    spacing = np.asarray(box.spacing_mm, float)
+    if min(grey.shape) < 3 or not len(line := _strongest(_of_lines(grey, spacing), spacing)):
         return None
-    line = _strongest(_of_lines(grey, spacing), spacing)
-    if len(line) == 0:
-        return None
-    away = np.linalg.norm((line + first - at) * spacing, axis=1)
+    points = box.to_mm(line)
+    away = np.linalg.norm(points - entry_mm, axis=1)
     nearest = int(np.argmin(away))
-    if not BESIDE_MM < away[nearest] < REACH_MM:
-        return None
-    return Line(float(away[nearest]), frame.to_mm(line[nearest] + first))
+    return Line(float(away[nearest]), points[nearest])
 
 
 def _of_lines(grey: NDArray[np.float32], spacing: Array) -> Array:

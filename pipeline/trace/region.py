@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 from scipy.special import ndtr
 
 from pipeline.arrays.edges import layer_in
@@ -200,12 +201,26 @@ def _wall_model(
 
 
 def _on_box(reference: Volume, region: SearchRegion, axes: tuple[int, int, int]) -> tuple[Grid, NDArray[np.int64]]:
-    """The reference, and where in it the region's box starts; interpolated onto the box if lattices differ."""
+    """The reference, and where in it the region's box starts; interpolated near the lumen where lattices differ."""
     grid = reorder(reference, axes)
     corner = integer_offset(grid, region.box)
     if corner is not None and np.all(corner >= 0) and np.all(corner + region.box.shape <= np.array(grid.shape)):
         return contiguous(grid), corner
-    return contiguous(sampled(grid, region.box, 0.0)), np.zeros(3, np.int64)
+    return region.box.with_values(_interpolated(grid, region)), np.zeros(3, np.int64)
+
+
+def _interpolated(scan: Grid, region: SearchRegion) -> NDArray[np.float32]:
+    """A scan's grey on the region's box, at its runs alone; 0 beyond the scan.
+
+    By cubic splines: halfway between voxels trilinear grey is off by 5 % of the contrast at a wall blurred by 0.7
+    voxel, which was a mark as bright as a thin wire. Splines leave 2 %.
+    """
+    at = voxels_of(region.runs)
+    splines = ndimage.spline_filter(scan.values, output=np.float32)
+    out = sparse_zeros(region.box.shape, np.float32)
+    index = scan.to_index(region.box.to_mm(at)).T
+    out[tuple(at.T)] = ndimage.map_coordinates(splines, index, np.float32, mode="constant", prefilter=False)
+    return out
 
 
 Background = tuple[NDArray[Any], NDArray[Any] | None]

@@ -7,9 +7,10 @@ in another frame, and stayed there while the wire came nearer, is no part of it:
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from pipeline.model import Curve, arc_length
+from pipeline.model import Array, Curve, arc_length
 from pipeline.run.stages.known import Frame, trusted
 from pipeline.status import FrameStatus
 from pipeline.trace import BEYOND_GAP, GAP
@@ -30,7 +31,7 @@ END_MM = 2.0
 
 
 def own_gaps(frames: Sequence[Frame], voxel_mm: float) -> tuple[list[Frame], list[str]]:
-    """The frames, cleared of the doubt about a gap where they agree on it; and a warning for each other gap's frame.
+    """The frames, cleared of the doubt about a gap where they agree on it; and warnings of gaps that are no streak's.
 
     Of gaps, frames with a stated depth are left out: it says where the wire ends. So are frames that are refused for
     something else, and copies of others: they agree with none.
@@ -41,20 +42,38 @@ def own_gaps(frames: Sequence[Frame], voxel_mm: float) -> tuple[list[Frame], lis
     curves = [seen[n] for n in with_gap]
     length = np.array([curve.length_mm for curve in curves])
     beyond = np.array([curve.levels[BEYOND_GAP] for curve in curves])
-    agreed = np.zeros(len(curves), bool)
-    for place in (beyond, length - beyond):
-        same = np.abs(place - np.median(place)) < AGREE_VOXELS * voxel_mm if len(place) else agreed
-        if same.sum() >= FEWEST and np.ptp(length[same]) > MOVED_MM:
-            agreed |= same
+    with_tip, stays = (_same(place, length, voxel_mm) for place in (beyond, length - beyond))
+    agreed = with_tip | stays
     for n in np.flatnonzero(agreed):
         out[with_gap[n]] = out[with_gap[n]].cleared(curves[n].without(BEYOND_GAP))
     out = [_past_marks(frame, frames, voxel_mm) for frame in _faced(out, voxel_mm)]
     odd = [f"{out[with_gap[n]].index} ({beyond[n]:.1f} mm)" for n in np.flatnonzero(~agreed) if out[with_gap[n]].ok]
+    said = _pushed_along([out[with_gap[n]] for n in np.flatnonzero(with_tip & ~stays)])
     if not odd:
-        return out, []
+        return out, said
     return out, [
+        *said,
         f"{frames_named(odd)}: so much of the traced wire lies beyond a gap in it, and a second device that faces "
-        f"the wire's tip would look the same: look at the picture, or state insertion_mm{_at_one_place(out, voxel_mm)}"
+        f"the wire's tip would look the same: look at the picture, or state insertion_mm{_at_one_place(out, voxel_mm)}",
+    ]
+
+
+def _same(place: Array, length: Array, voxel_mm: float) -> NDArray[np.bool_]:
+    """Which gaps lie at one place (n,), in frames enough, whose wires (n,) mm long have been pushed between them."""
+    same = np.abs(place - np.median(place)) < AGREE_VOXELS * voxel_mm if len(place) else np.zeros(0, bool)
+    return same & (same.sum() >= FEWEST and np.ptp(length[same]) > MOVED_MM)
+
+
+def _pushed_along(frames: Sequence[Frame]) -> list[str]:
+    """A warning of frames whose gaps go with their tips: a device that is pushed with the wire looks so, too."""
+    levels = {f.index: f.curve.levels for f in frames if f.ok and f.curve is not None}
+    if not levels:
+        return []
+    beyond, gap = (float(np.median([of[name] for of in levels.values()])) for name in (BEYOND_GAP, GAP))
+    return [
+        f"{frames_named([*levels])}: the last {beyond:.1f} mm of the traced wire lie beyond a gap that goes "
+        "with its tip: taken for the wire's own; were they a second device that was pushed with the wire, its tip "
+        f"would lie {beyond + gap:.1f} mm before: look at the picture, or state insertion_mm"
     ]
 
 
