@@ -153,8 +153,7 @@ def segment(
         thin.add_balls(wall.values, np.asarray(grid.spacing_mm), branches, config.outer_mm)
     other = brighter(wall.levels, wire_radius_mm is not None) + bright + uneven.warning(found.least)
     said = _of_the_vessel(scan, found) + warning(touching) + _beside_it(found)
-    # a membrane between vessels is a second grey
-    said += other or (() if touching else bone.two_greys(*boxed, wall.blur_mm))
+    said += other or bone.two_greys(*boxed, wall.blur_mm)
     box = wall.values, site.corner
     said += add_necks(region.necks, box, grid, region.levels, blur)
     said += add_necks(closed_necks(*box, grid, config.least_voxels), box, grid, region.levels, blur)
