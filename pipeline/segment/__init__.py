@@ -147,7 +147,9 @@ def segment(
     found = _beside_wire(scan, seeds_mm, config, wire_radius_mm)
     grid, region, site, wall, blur = found.grid, found.region, found.site, found.wall, found.blur
     boxed = grid, found.distance, site.corner, wall.levels
-    touching, bright = side_by_side(lambda: open_ones(*boxed, region.taps), lambda: bone.touching(*boxed))
+    touching, bright = side_by_side(
+        lambda: open_ones(*boxed, region.taps, wall.sides is None), lambda: bone.touching(*boxed)
+    )
     if len(region.thin):
         branches = thin.balls(grid, region.thin, site.corner, region.levels, blur)
         thin.add_balls(wall.values, np.asarray(grid.spacing_mm), branches, config.outer_mm)

@@ -44,16 +44,17 @@ NEXT_TO = 0.1
 
 
 def open_ones(
-    scan: Grid, distance: Grid, corner: Index, levels: GreyLevels, taps: NDArray[np.float32]
+    scan: Grid, distance: Grid, corner: Index, levels: GreyLevels, taps: NDArray[np.float32], even: bool
 ) -> tuple[Contact, ...]:
     """Places where vessels that do not branch from each other are open to each other, by their shape or by a sheet.
 
     distance : signed distance on the vessel's box, which begins at ``corner`` of the scan.  taps : the smoothing in
-    which the vessel was found.
+    which the vessel was found.  even : whether it is filled alike across; a wire in a fainter layer leaves a sheet
+    between it and the brighter one.
     """
     seen = contacts(distance)
-    sheet = sheets(scan, distance, corner, levels, taps)
-    if not len(sheet):
+    sheet = sheets(scan, distance, corner, levels, taps) if even else None
+    if sheet is None or not len(sheet):
         return seen
     return max(seen, contacts(_parted(distance, sheet), LEAST_AREA), key=lambda found: sum(c.area_mm2 for c in found))
 
