@@ -14,7 +14,7 @@ from pipeline.arrays.grids import in_memory_order, reorder
 from pipeline.model import Lumen, Volume
 from pipeline.segment import bone, leaked, thin, uneven, valley
 from pipeline.segment.config import SegmentConfig
-from pipeline.segment.contact import contacts, warning
+from pipeline.segment.contact import warning
 from pipeline.segment.cut_off import cut_off
 from pipeline.segment.ends import ends
 from pipeline.segment.flat_side import flat_side
@@ -23,6 +23,7 @@ from pipeline.segment.layered import layer_around, surrounded, with_layer_alone
 from pipeline.segment.levels import Region, brighter, scanner_blur
 from pipeline.segment.necks import add_necks, closed_necks
 from pipeline.segment.on_wire import beside, swallowed
+from pipeline.segment.sheets import open_ones
 from pipeline.segment.surface import SignedDistance, Site, prepare, wall_of
 from pipeline.segment.uneven import evened
 from pipeline.status import StageError
@@ -145,22 +146,23 @@ def segment(
     scan, axes = in_memory_order(volume)
     found = _beside_wire(scan, seeds_mm, config, wire_radius_mm)
     grid, region, site, wall, blur = found.grid, found.region, found.site, found.wall, found.blur
-    open_ones, bright = side_by_side(
-        lambda: contacts(found.distance), lambda: bone.touching(grid, found.distance, site.corner, wall.levels)
+    boxed = grid, found.distance, site.corner, wall.levels
+    touching, bright = side_by_side(
+        lambda: open_ones(*boxed, region.taps, wall.sides is None), lambda: bone.touching(*boxed)
     )
     if len(region.thin):
         branches = thin.balls(grid, region.thin, site.corner, region.levels, blur)
         thin.add_balls(wall.values, np.asarray(grid.spacing_mm), branches, config.outer_mm)
     other = brighter(wall.levels, wire_radius_mm is not None) + bright + uneven.warning(found.least)
-    said = _of_the_vessel(scan, found) + warning(open_ones) + _beside_it(found)
-    said += other or bone.two_greys(grid, found.distance, site.corner, wall.levels, wall.blur_mm)
+    said = _of_the_vessel(scan, found) + warning(touching) + _beside_it(found)
+    said += other or bone.two_greys(*boxed, wall.blur_mm)
     box = wall.values, site.corner
     said += add_necks(region.necks, box, grid, region.levels, blur)
     said += add_necks(closed_necks(*box, grid, config.least_voxels), box, grid, region.levels, blur)
     said += ends(grid, found.distance, site.corner, wall.levels, wall.wall, region.taps)
     return Lumen(
         reorder(found.distance, axes), wall.levels.half, said,
-        {**region.counters, **wall.counters, "touching_places": float(len(open_ones))},
+        {**region.counters, **wall.counters, "touching_places": float(len(touching))},
         {"noise": region.levels.noise, "wall_noise_mm": wall.noise_mm(region.taps), "blur_mm": wall.blur_mm,
          "scanner_blur_mm": blur, "least_filling": found.least}
         | ({} if found.layer is None else {"layer": found.layer.grey}),

@@ -108,10 +108,11 @@ def _vessels_only(core: NDArray[np.bool_], cores: Cores, thick: Array, voxel: fl
     return np.asarray(core & good[part])
 
 
-def contacts(distance: Grid) -> tuple[Contact, ...]:
+def contacts(distance: Grid, least_area: float = 0.0) -> tuple[Contact, ...]:
     """Places where vessels that do not branch from each other are open to each other.
 
-    distance : signed distance, mm, negative inside; C-contiguous.
+    distance : signed distance, mm, negative inside; C-contiguous.  least_area : of an opening, over the square of the
+    vessel's radius.
     """
     values, spacing = distance.values, np.asarray(distance.spacing_mm)
     inner, voxels = inside_of(values)
@@ -136,10 +137,18 @@ def contacts(distance: Grid) -> tuple[Contact, ...]:
     found = found[[passes[p] and passes[q] for _, p, q in found]]
     if len(found) == 0:
         return ()
-    places = unflattened(inner[found[:, 0]], values.shape)
-    group = parts(places.astype(float), 2.0 * float(np.median(thick[found[:, 1]])) / voxel)
+    # a face stands for as many as were passed over, of an area each
     face = every * float(np.prod(spacing) ** (2 / 3))
-    groups = [places[group == n] for n in range(group.max() + 1)]
+    openings = _openings(unflattened(inner[found[:, 0]], values.shape), thick[found[:, 1]], voxel)
     return tuple(
-        Contact(distance.to_mm(g.mean(axis=0)), len(g) * face) for g in groups if every * len(g) >= LEAST_FACES
+        Contact(distance.to_mm(at.mean(axis=0)), len(at) * face)
+        for at, radius in openings
+        if every * len(at) >= LEAST_FACES and len(at) * face >= least_area * radius**2
     )
+
+
+def _openings(places: Index, radius: Array, voxel: float) -> list[tuple[Index, float]]:
+    """The faces (n, 3) of each opening, in voxels, and the vessel's radius there, mm; radius : at each face."""
+    group = parts(places.astype(float), 2.0 * float(np.median(radius)) / voxel)
+    each = [group == n for n in range(group.max() + 1)]
+    return [(places[own], float(np.median(radius[own]))) for own in each]

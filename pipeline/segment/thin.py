@@ -36,6 +36,8 @@ SIGMAS = 4.5
 ever several side by side."""
 SKIRT = 3
 """Layers around the voxels at FULL that the vessel's own blur may fill: from 0.65 to 0.09 it falls in two voxels."""
+MISSED = 2
+"""Layers around what connectedness found that may be the vessel still, where as bright as FULL; so has the wall."""
 SHORTEST = 6
 """Voxels from end to end of a branch."""
 FATTEST = 45.0
@@ -93,24 +95,35 @@ def _low_affinity(levels: GreyLevels, affinity: Affinity) -> Affinity | None:
     return affinity._replace(homogeneity=alike, feature=feature)
 
 
-def beyond_skirt(volume: Grid, thick: Index, low: Index) -> tuple[Index, Inner]:
-    """Voxels of ``low`` that the blur of ``thick`` does not reach, flat and ascending, and the same voxels in a box."""
-    corner, shape = padded_box(low, volume, 0.0)
+def _layers(around: Index, of: Index, shape: tuple[int, int, int], count: int) -> NDArray[np.uint8]:
+    """For voxels ``of`` a padded box (flat): 1 for those ``around``, 2, 3, ... in layers around them, 0 beyond."""
     state = sparse_zeros(shape, np.uint8)
-    main, wide = (into_box(o, volume, corner, shape) for o in (thick, low))
-    state.reshape(-1)[main] = 1
-    dilate(state, main, SKIRT, 2)
-    inner = np.sort(wide[state.reshape(-1)[wide] == 0])
-    return rebased(inner, shape, corner - PAD, volume.shape), numbered(shape, inner)
+    state.reshape(-1)[around] = 1
+    dilate(state, around, count, 2)
+    return np.asarray(state.reshape(-1)[of])
+
+
+def beyond_skirt(
+    volume: Grid, order: Index, low: Index, bright: float, taps: NDArray[Any]
+) -> tuple[Index, Inner, bool]:
+    """Voxels of ``low`` that the blur of the vessel does not reach, flat and ascending, and the same voxels in a box.
+
+    order : the vessel's voxels, of which those from a grey ``bright`` on count, and so do those in MISSED layers around
+    it. Also returns whether there are any.
+    """
+    corner, shape = padded_box(low, volume, 0.0)
+    main, wide = (into_box(o, volume, corner, shape) for o in (order, low))
+    near = low[_layers(main, wide, shape, MISSED) > 0]
+    thick = near[smooth_voxels(volume.values, taps, near) >= bright]
+    inner = np.sort(wide[_layers(into_box(thick, volume, corner, shape), wide, shape, SKIRT) == 0])
+    return rebased(inner, shape, corner - PAD, volume.shape), numbered(shape, inner), len(thick) > 0
 
 
 def beyond_vessel(volume: Grid, low: Index, order: Index, levels: GreyLevels, affinity: Affinity) -> Beyond:
     """What lies beyond the vessel ``order``, among the voxels of ``low_region``."""
-    bright = smooth_voxels(volume.values, affinity.taps, order)
-    thick = order[bright >= levels.outside + FULL * levels.contrast]
-    found, inner = beyond_skirt(volume, thick, low)
+    found, inner, thick = beyond_skirt(volume, order, low, levels.outside + FULL * levels.contrast, affinity.taps)
     share = (smooth_voxels(volume.values, affinity.taps, found) - levels.outside) / levels.contrast
-    return Beyond(found, inner, share, len(thick) > 0)
+    return Beyond(found, inner, share, thick)
 
 
 def low_region(volume: Grid, seeds: Index, levels: GreyLevels, affinity: Affinity) -> tuple[Index, float]:

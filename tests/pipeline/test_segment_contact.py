@@ -52,6 +52,27 @@ def test_vessels_that_merge_are_warned_of_where_they_do(wall_mm, voxel):
     np.testing.assert_allclose(place, [0.0, 0.0, 10.0], rtol=0.0, atol=2.0)
 
 
+def pressed_flat(membrane_mm, length_mm=10.0, voxel=0.3, radius_mm=1.5):
+    """Two vessels that a membrane parts, pressed flat against each other over a length and bent away beyond."""
+    shape = (60, 24, 90)
+    x, y, z = ((np.indices(shape)[n] - 0.5 * (shape[n] - 1)) * voxel for n in range(3))
+    middle = radius_mm - 0.35 + 0.05 * np.maximum(np.abs(z) - 0.5 * length_mm, 0.0) ** 2
+    clean = phantoms.partial_volume(np.hypot(np.abs(x) - middle, y) - radius_mm, voxel)
+    edges = np.clip(np.abs(x)[None] + 0.5 * voxel * np.array([-1.0, 1.0])[:, None, None, None], None, 0.5 * membrane_mm)
+    clean *= 1.0 - (edges[1] - np.maximum(edges[0], -0.5 * membrane_mm)) / voxel
+    low = -0.5 * voxel * (np.array(shape) - 1)
+    return Volume(phantoms.scan(100.0 + 900.0 * clean, 0.8, 60.0, 0), [voxel] * 3, low)
+
+
+@pytest.mark.parametrize("membrane_mm", [0.12, 0.2, *later(0.25, 0.3, 0.35)])
+def test_a_membrane_thinner_than_a_voxel_is_seen_by_its_darker_sheet(membrane_mm):
+    """The grey was above half height all over it, and the wire went through without a word."""
+    lumen = segment(pressed_flat(membrane_mm), [[1.5, 0.0, 0.0]])
+    assert "open to each other in 1 place" in lumen.warnings[0]
+    area = float(lumen.warnings[0].split("mm (")[1].split()[0])
+    assert 12.0 < area < 40.0  # 1.9 mm wide over 10 mm, and up to twice that as faces of voxels are counted
+
+
 @pytest.mark.parametrize(
     ("anatomy", "low", "high"),
     [

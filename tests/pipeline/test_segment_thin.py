@@ -8,6 +8,7 @@ from scipy.ndimage import label, map_coordinates
 
 from pipeline.model import Volume
 from pipeline.segment import segment
+from pipeline.segment.config import SegmentConfig
 from tests.later import later
 from tests.pipeline import phantoms
 
@@ -61,6 +62,25 @@ def test_no_branch_is_made_of_noise_or_of_the_skirt_of_a_vessel():
     for seed in range(100, 104):
         lumen = lumen_of(0.0, 9, seed)
         assert lumen.counters["voxels_thin"] == 0
+
+
+def test_no_branch_is_made_of_a_vessel_that_connectedness_reaches_in_part():
+    """At a threshold of 0.95 noise keeps its voxels off the wall: balls, 2.6 voxels high, were put on outer bends."""
+    z = np.linspace(-16.0, 16.0, 640)
+    axis = np.stack([1.5 * np.sin(z / 5), 0.8 * np.cos(z / 6), z], 1)
+    low = np.array([-5.0, -4.4, -14.9])
+    away = phantoms.distance_to(axis, (34, 30, 100), VOXEL, low, 4.0)
+    grey = phantoms.scan(100.0 + 900.0 * phantoms.partial_volume(np.minimum(away, 4.0) - 1.5, VOXEL), 0.8, 60.0, 0)
+    usual, strict = (
+        segment(Volume(grey, [VOXEL] * 3, low), [[0.0, 0.8, 0.0]], SegmentConfig(threshold=threshold))
+        for threshold in (0.6, 0.95)
+    )
+    assert strict.counters["voxels_visited"] < 0.7 * usual.counters["voxels_visited"]
+    assert strict.counters["voxels_thin"] == 0
+    at = np.argwhere(np.abs(usual.distance.values) < VOXEL)
+    there = strict.distance.to_index(usual.distance.to_mm(at)).T
+    off = map_coordinates(strict.distance.values, there, order=1) - usual.distance.values[tuple(at.T)]
+    assert np.abs(off).max() < 0.1 * VOXEL
 
 
 @pytest.mark.parametrize(("share", "expected"), [(0.35, True), (0.45, True), (1.0, False)])

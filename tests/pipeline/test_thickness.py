@@ -35,6 +35,14 @@ def test_a_diameter_given_for_the_radius_is_told(radius_mm: float) -> None:
     assert too_thin(frames(radius_mm), lumen(), radius_mm) == []
     (said,) = too_thin(frames(radius_mm), lumen(), 2.0 * radius_mm)
     assert f"{3.0 * radius_mm:.2f} mm thick at most, and radius_mm = {2.0 * radius_mm:g}" in said
+    assert "is it the diameter?" in said
+
+
+def test_a_tenth_less_is_told_and_not_taken_for_a_diameter() -> None:
+    """Of a right radius of 0.18 mm in a lumen that a membrane parts it was asked whether it was the diameter."""
+    (said,) = too_thin(frames(0.18, fitted=0.88), lumen(), 0.18)
+    assert "looks 0.32 mm thick at most, and radius_mm = 0.18 says 0.36 mm: 12 % less" in said
+    assert "diameter" not in said
 
 
 @pytest.mark.parametrize(

@@ -14,6 +14,8 @@ LEAST_SHARE = 0.9
 """Ratio of the seen to the stated radius below which the latter is doubted. It is 1.15 to 2.1 in 17 scenes of the
 catalogue (the fit is wider than a blurred disc); with twice the radius stated it is 0.57 to 1.05: 15 of them are
 noticed."""
+DIAMETER_SHARE = 0.8
+"""The same below which the radius may be a diameter: of 0.18 mm in a lumen whose wall looked blunt it was 0.89."""
 LEAST_VOXELS = 1.2
 """Least stated diameter, voxels, whose blur differs from a thin line's: at 0.84 voxels the ratio was 1.0."""
 MOST_SHARE, MORE_VOXELS = 2.5, 0.75
@@ -35,9 +37,15 @@ def too_thin(frames: Sequence[Frame], lumen: Lumen, radius_mm: float) -> list[st
     seen = _seen_radius_mm(float(np.median(blurs)), lumen)
     if not 0.0 < seen < LEAST_SHARE * radius_mm:  # no line is sharper than the scanner: its blur is misjudged
         return []
+    if seen < DIAMETER_SHARE * radius_mm:
+        doubt = "is it the diameter? wall contact and stiffness hang on it"
+    else:
+        doubt = (
+            f"{100.0 * (1.0 - seen / radius_mm):.0f} % less; check it, or the lumen, whose wall tells the scan's blur"
+        )
     return [
         f"the traced wire looks {2.0 * seen:.2f} mm thick at most, and radius_mm = {radius_mm:g} says "
-        f"{2.0 * radius_mm:g} mm: is it the diameter? wall contact and stiffness hang on it"
+        f"{2.0 * radius_mm:g} mm: {doubt}"
     ]
 
 
