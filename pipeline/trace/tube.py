@@ -11,18 +11,12 @@ from pipeline.model import Array, arc_length
 from pipeline.trace._kernels import tube as kernels
 from pipeline.trace._kernels.skyline import factorise, substitute
 from pipeline.trace._kernels.tube import Blob, Claim, Equations, Line, Samples
+from pipeline.trace.smoothness import smoothness
 from pipeline.trace.steps import EVEN, Steps
 from pipeline.trace.subtraction import Subtraction, numbered
 
 WINDOW = 3.0
 """Radius of the fitted voxels about the curve, in blurs."""
-STIFFNESS = 2.0
-"""Prior's standard deviation (voxel) of third differences of control points: it carries gaps and leaves bends free."""
-FULL_KNOT = 8.0
-"""Knot distance (voxel) from which that holds; below, it falls with the cube of the distance, as third differences of
-one and the same bend do: else a short wire, which has two intervals whatever its length, curls up in the noise."""
-TIGHTEST = 10.0
-"""Radius (voxel) of the bend that second differences of a short wire get as standard deviation: it cannot turn back."""
 TINT_KNOTS = 4
 """Spline intervals per amplitude node."""
 GREGORY = np.array([3.0 / 8.0, 7.0 / 6.0, 23.0 / 24.0])
@@ -161,27 +155,6 @@ def spline_through(points: Array, knot: float) -> Array:
     return np.asarray(substitute(*factors, basis.T @ points))
 
 
-def _prior(tube: Tube, image: Subtraction) -> Array:
-    """Normal matrix of the smoothness prior on the control points.
-
-    Its tails are those of Cauchy's: a hook of 4 voxels has differences of 9 standard deviations, which a Gaussian one
-    straightened (its tip lay 0.23 voxel off).
-    """
-    knot, voxel = tube.knot_mm, image.voxel
-    loose = STIFFNESS * min(1.0, knot / (FULL_KNOT * voxel)) ** 3 * voxel
-    block = _heavy_tailed(tube.controls, 3, loose)
-    if knot < FULL_KNOT * voxel:
-        block += _heavy_tailed(tube.controls, 2, knot**2 / (TIGHTEST * voxel))
-    return np.asarray(np.kron(block * image.noise**2, np.eye(3)))
-
-
-def _heavy_tailed(controls: Array, order: int, spread: float) -> Array:
-    """Normal matrix (k, k) of differences of control points (k, 3), ``spread`` large, about those that they have."""
-    difference = np.diff(np.eye(len(controls)), n=order, axis=0)
-    size = np.sum((difference @ controls) ** 2, axis=1) / spread**2
-    return np.asarray(difference.T @ (difference / (spread**2 * (1.0 + size / 3.0))[:, None]))
-
-
 def weights(image: Subtraction, tube: Tube, voxels: NDArray[np.int64]) -> Array:
     """Weights (n,) of the voxels near the tube: none at its start for those that lie before its start plane."""
     if tube.start_plane is None:
@@ -196,7 +169,7 @@ def weights(image: Subtraction, tube: Tube, voxels: NDArray[np.int64]) -> Array:
 def _equations(image: Subtraction, tube: Tube, samples: Samples) -> tuple[Equations, Claim, Line]:
     """One set of normal equations, with the prior, the voxels that they are of, and the tube at its samples."""
     line, blob, k = sampled(tube, samples), tube.blob(image.voxel), len(tube.controls)
-    prior = _prior(tube, image)
+    prior = smoothness(tube.controls, tube.knot_mm, image.voxel) * image.noise**2
     with numbered(image, line.curve, blob.radius) as (voxels, slot):
         claim = Claim(voxels, slot, weights(image, tube, voxels))
         e = kernels.normal_equations(image.grey, image.spacing, claim, line, blob, k, len(tube.tint))
