@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 from pipeline.arrays.polyline import turns_deg
 from pipeline.model import Array, Curve, arc_length
 from pipeline.trace.crests import BEND, Tracklet, find_crests
-from pipeline.trace.knots import CLOSEST, FIRST_BLUR, first_tube
+from pipeline.trace.knots import FIRST_BLUR, first_tube
 from pipeline.trace.link import Path, first_ahead, link, resampled, with_doubles
 from pipeline.trace.onward import beyond
 from pipeline.trace.profile import LEAST_LEVEL, ended
@@ -24,11 +24,6 @@ PREFIX_MM = 3.0
 STREAK_SHARE = 0.2
 """Crest grey, as a share of the wire's peak, below which a bright line is a streak of the wire: a second wire's crest
 has 0.6 to 0.9 of it, streaks of steel in a cone-beam scan reach a few hundredths."""
-WIDE_KNOTS = 1.4
-"""Knot distance over CLOSEST from which closer knots are tried, as below 6 noises. At 8 noises they would gain 2 % and
-cost a fourth of the time."""
-BENDS_SURE = 4.0
-"""Standard deviations by which closer knots must save more than they do by chance."""
 MOST_SHARP_DEG = 60.0
 """Angle within a voxel beyond which a fit has folded: right curves turn by up to 27 (a J tip), folds by 60 to 170."""
 NEAR_VOXELS = 2.5
@@ -98,11 +93,11 @@ class Attempt:
 
 
 def _fitted(
-    image: Subtraction, points: Array, cut: bool, entry: EntryPose, find_tip: bool = True, closest: bool = False
+    image: Subtraction, points: Array, cut: bool, entry: EntryPose, find_tip: bool = True, knots: float | None = None
 ) -> Tube | None:
     """The tube along a path; None where the path is so wrong that its equations have no solution.
 
-    cut : wire goes on before the path's first point.  closest : its knots are as close as they may be.
+    cut : wire goes on before the path's first point.  knots : voxels from one to the next, see ``first_tube``.
     """
     h = image.voxel
     try:
@@ -112,7 +107,7 @@ def _fitted(
         elif find_tip and entry.opacity is not None:
             line, steps = ended_as_stated(image, line, FIRST_BLUR * h, entry.opacity)
         plane = (line[0] + 2.0 * h * entry.direction, entry.direction) if cut else None
-        return fit_tube(image, replace(first_tube(image, line, steps, closest), start_plane=plane))
+        return fit_tube(image, replace(first_tube(image, line, steps, knots), start_plane=plane))
     except (np.linalg.LinAlgError, ValueError):
         return None
 
@@ -230,29 +225,12 @@ def beside(image: Subtraction, attempt: Attempt, pieces: list[Tracklet]) -> Atte
     return replace(attempt, pieces=pieces, off=_off(image, attempt.tube, pieces, attempt.known))
 
 
-def again(image: Subtraction, attempt: Attempt, entry: EntryPose, closest: bool = False) -> Attempt:
-    """The attempt fitted anew, tip and all, to another image of the same frame or with the closest knots; itself where
-    that has no solution.
+def again(image: Subtraction, attempt: Attempt, entry: EntryPose, knots: float | None = None) -> Attempt:
+    """The attempt fitted anew, tip and all, to another image of the same frame or with other knots; itself where that
+    has no solution.  knots : voxels from one to the next, see ``first_tube``.
     """
-    tube = _fitted(image, dense(attempt.tube, 0.5 * image.voxel), attempt.cut, entry, closest=closest)
+    tube = _fitted(image, dense(attempt.tube, 0.5 * image.voxel), attempt.cut, entry, knots=knots)
     return attempt if tube is None else replace(attempt, tube=tube)
-
-
-def bent(image: Subtraction, attempt: Attempt, entry: EntryPose) -> Attempt:
-    """The attempt with closer knots where the grey asks for them, as in bends that wide ones cut short; else itself.
-
-    Each further unknown takes one variance of the noise, with a standard deviation of sqrt(2), off the misfit of any
-    wire; only what is BENDS_SURE beyond that is a bend.
-    """
-    if attempt.tube.knot_mm < WIDE_KNOTS * CLOSEST * image.voxel:
-        return attempt
-    closer = again(image, attempt, entry, closest=True)
-    more = 3.0 * (closer.tube.intervals - attempt.tube.intervals)
-    if more <= 0:
-        return attempt
-    wide, close = misfit(image, [attempt, closer])
-    saved = (wide - close) / image.correlation**2
-    return closer if saved > more + BENDS_SURE * np.sqrt(2.0 * more) else attempt
 
 
 def warm(image: Subtraction, entry: EntryPose, previous: Curve, crests_voxel: float, gap_mm: float) -> Attempt | None:

@@ -9,7 +9,10 @@ from pipeline.trace.subtraction import CREST_VOXELS, Subtraction
 from pipeline.trace.tube import Tube, spline_through, tint_nodes
 
 CLOSEST = 8.0
-"""Least distance between knots, voxels: closer ones only follow the noise."""
+"""Least distance between knots, voxels, of all but hooks: closer ones only follow the noise."""
+IN_HOOKS = 4.5
+"""The same of wires with a hook, which turns by a radian and more from knot to knot: half a circle of 2.7 voxels lies
+between two knots, and its tip was 0.55 voxel off."""
 KNOTS_PER_PITCH = 2.0
 """Least distance between knots, in :func:`slice_pitch`: with one knot a slice the curve follows each slice's own error
 (0.15 mm of ripple at 2.5 mm slices)."""
@@ -29,16 +32,16 @@ def slice_pitch(image: Subtraction, line: Array) -> float:
     return float(arc_length(line)[-1]) / max(slices, 1.0)
 
 
-def first_tube(image: Subtraction, points: Array, steps: Steps = EVEN, closest: bool = False) -> Tube:
+def first_tube(image: Subtraction, points: Array, steps: Steps = EVEN, knots: float | None = None) -> Tube:
     """Where the fit starts: a spline along the path, with the amplitude seen there.
 
-    closest : knots CLOSEST apart whatever the noise.  Noise falls with the distance of the knots, a bend's bias rises
-    (0.004 / 0.009 / 0.046 voxel at 8 / 10 / 14 voxels for radii of 20 to 40).
+    knots : how far apart knots are, whatever the noise.  Noise falls with their distance, a bend's bias
+    rises (0.004 / 0.009 / 0.046 voxel at 8 / 10 / 14 voxels for radii of 20 to 40).
     """
     h = image.voxel
     line = resampled(points, 0.5 * h)
     gain = 1.0 + (CREST_VOXELS / FIRST_BLUR) ** 2
     amplitude = max(float(np.median(image.along(line[::4]))) * gain, image.noise)
-    knot = CLOSEST if closest else float(np.interp(amplitude / image.noise, [4.0, 8.0, 16.0], [12.0, 10.0, CLOSEST]))
+    knot = knots or float(np.interp(amplitude / image.noise, [4.0, 8.0, 16.0], [12.0, 10.0, CLOSEST]))
     controls = spline_through(line, max(knot * h, KNOTS_PER_PITCH * slice_pitch(image, line)))
     return Tube(controls, np.full(tint_nodes(len(controls) - 3), amplitude), FIRST_BLUR * h, 0.0, steps=steps)

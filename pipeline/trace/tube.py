@@ -11,18 +11,12 @@ from pipeline.model import Array, arc_length
 from pipeline.trace._kernels import tube as kernels
 from pipeline.trace._kernels.skyline import factorise, substitute
 from pipeline.trace._kernels.tube import Blob, Claim, Equations, Line, Samples
+from pipeline.trace.smoothness import smoothness
 from pipeline.trace.steps import EVEN, Steps
 from pipeline.trace.subtraction import Subtraction, numbered
 
 WINDOW = 3.0
 """Radius of the fitted voxels about the curve, in blurs."""
-STIFFNESS = 2.0
-"""Prior's standard deviation (voxel) of third differences of control points: it carries gaps and leaves bends free."""
-FULL_KNOT = 8.0
-"""Knot distance (voxel) from which that holds; below, it falls with the cube of the distance, as third differences of
-one and the same bend do: else a short wire, which has two intervals whatever its length, curls up in the noise."""
-TIGHTEST = 10.0
-"""Radius (voxel) of the bend that second differences of a short wire get as standard deviation: it cannot turn back."""
 TINT_KNOTS = 4
 """Spline intervals per amplitude node."""
 GREGORY = np.array([3.0 / 8.0, 7.0 / 6.0, 23.0 / 24.0])
@@ -161,18 +155,6 @@ def spline_through(points: Array, knot: float) -> Array:
     return np.asarray(substitute(*factors, basis.T @ points))
 
 
-def _prior(tube: Tube, image: Subtraction) -> Array:
-    """Normal matrix of the smoothness prior on the control points."""
-    count, knot, voxel = len(tube.controls), tube.knot_mm, image.voxel
-    third = np.diff(np.eye(count), n=3, axis=0)
-    loose = STIFFNESS * min(1.0, knot / (FULL_KNOT * voxel)) ** 3
-    block = third.T @ third * (image.noise / (loose * voxel)) ** 2
-    if knot < FULL_KNOT * voxel:
-        second = np.diff(np.eye(count), n=2, axis=0)
-        block += second.T @ second * (image.noise * TIGHTEST * voxel / knot**2) ** 2
-    return np.asarray(np.kron(block, np.eye(3)))
-
-
 def weights(image: Subtraction, tube: Tube, voxels: NDArray[np.int64]) -> Array:
     """Weights (n,) of the voxels near the tube: none at its start for those that lie before its start plane."""
     if tube.start_plane is None:
@@ -184,9 +166,10 @@ def weights(image: Subtraction, tube: Tube, voxels: NDArray[np.int64]) -> Array:
     return np.where(at_start & ((index - point) @ direction <= 0), 0.0, 1.0)
 
 
-def _equations(image: Subtraction, tube: Tube, samples: Samples, prior: Array) -> tuple[Equations, Claim, Line]:
+def _equations(image: Subtraction, tube: Tube, samples: Samples) -> tuple[Equations, Claim, Line]:
     """One set of normal equations, with the prior, the voxels that they are of, and the tube at its samples."""
     line, blob, k = sampled(tube, samples), tube.blob(image.voxel), len(tube.controls)
+    prior = smoothness(tube.controls, tube.knot_mm, image.voxel) * image.noise**2
     with numbered(image, line.curve, blob.radius) as (voxels, slot):
         claim = Claim(voxels, slot, weights(image, tube, voxels))
         e = kernels.normal_equations(image.grey, image.spacing, claim, line, blob, k, len(tube.tint))
@@ -257,18 +240,18 @@ def fit_tube(image: Subtraction, tube: Tube, iterations: int = 12, tolerance: fl
     Stops when no point of the curve moves by more than ``tolerance`` voxel. The result carries the covariance of its
     columns (controls, amplitudes, blur, offset), for the noise of the image.
     """
-    samples, prior = sampling(tube, image.voxel), _prior(tube, image)
+    samples = sampling(tube, image.voxel)
     # a bright piece is off a Gaussian by a few hundredths, which the offset takes up; a dim end would drown in that
     stepped = [-1] if tube.steps.levels[-1] < DIM_END * tube.steps.levels.max() else []
     done = 0
     for done in range(1, iterations + 1):
-        found, _, line = _equations(image, tube, samples, prior)
+        found, _, line = _equations(image, tube, samples)
         normal, right = _damped(found.normal, tube, SLIDING), found.right
         _hold(normal, right, [-2] * (done <= BLUR_HELD) + stepped)
         tube, size = _moved(tube, substitute(*_factors(normal), right[:, None])[:, 0], image.voxel, line)
         if size < tolerance * image.voxel and done > BLUR_HELD:
             break
-    found, claim, _ = _equations(image, tube, samples, prior)
+    found, claim, _ = _equations(image, tube, samples)
     rms = float(np.sqrt(found.square / max(1.0, claim.weight.sum())))
     normal = _damped(found.normal, tube, POLISHED)
     _hold(normal, found.right, stepped)
