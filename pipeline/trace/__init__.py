@@ -14,7 +14,7 @@ from pipeline.trace.attempt import EntryPose
 from pipeline.trace.coarse import coarse_lumen, coarse_scan, times
 from pipeline.trace.config import TraceConfig
 from pipeline.trace.doubts import FAINT_BEYOND
-from pipeline.trace.elsewhere import DARK, brightest_line, passed_by_dark
+from pipeline.trace.elsewhere import hint_of_lines
 from pipeline.trace.explain import explained, hardly_begun, missed_mm
 from pipeline.trace.onward import GOES_ON
 from pipeline.trace.region import shows_lumen
@@ -85,9 +85,8 @@ def trace(
         if again.status is FrameStatus.OK and not (ok and _same(again, curve, voxel, 1.0)):
             curve = again
     if len(curve.points_mm) == 0:
-        dark = passed_by_dark(frame, reference, stated.point)
-        line = DARK if dark else brightest_line(frame, reference, stated.point)
-        return curve.reworded(lambda note: f"{note}; {line}") if line else curve
+        hint = hint_of_lines(frame, reference, stated.point)
+        return curve.reworded(lambda note: note + hint)
     axis = np.asarray(config.rotation_axis, float) if config.rotation_axis else frame.direction[:, 2]
     in_plane = near_rotation_plane(curve.points_mm, axis, config.in_plane_deg)
     in_plane_mm = float(in_plane.mean()) * curve.length_mm

@@ -36,6 +36,12 @@ class Line(NamedTuple):
         return f"the brightest line near it {where}: if that is the wire, entry_mm belongs on it"
 
 
+def hint_of_lines(frame: Volume, reference: Volume | None, entry_mm: Array) -> str:
+    """What lines near the entry tell, to be added to a note; empty where there are none."""
+    line = DARK if passed_by_dark(frame, reference, entry_mm) else brightest_line(frame, reference, entry_mm)
+    return f"; {line}" if line else ""
+
+
 def brightest_line(frame: Volume, reference: Volume | None, entry_mm: Array) -> Line | None:
     """The brightest line within ``REACH_MM`` of the entry; None without one, or where it passes the entry.
 
