@@ -32,9 +32,9 @@ def hooked(radius: float, seed: int, cnr: float) -> tuple[Volume, Volume, np.nda
     return frame, still, path[240:], plane[:, 0]
 
 
-@pytest.mark.parametrize(("radius", "most"), [(0.8, 0.45), *later((1.3, 0.2), (2.0, 0.14))])
+@pytest.mark.parametrize(("radius", "most"), [(0.8, 0.45), *later((1.3, 0.2))])
 def test_the_tip_of_a_hook_is_not_drawn_outwards(radius: float, most: float) -> None:
-    """0.5, 0.25 and 0.2 voxel, 4 to 7 times the stated sigma, always outwards, and ok."""
+    """0.57 and 0.38 voxel, 4 to 7 times the stated sigma, always outwards, and ok."""
     outwards, share = [], []
     for seed in (0, 1):
         frame, still, true, direction = hooked(radius, seed, 24.0)
