@@ -11,13 +11,16 @@ FULL_KNOT = 8.0
 one and the same bend do: else a short wire, which has two intervals whatever its length, curls up in the noise."""
 TIGHTEST = 10.0
 """Radius (voxel) of the bend that second differences of a short wire get as standard deviation: it cannot turn back."""
+TAIL = 5.0
+"""Square of a difference, in those deviations, from which it counts half: with 3 a curve at a contrast of 2 wandered
+off in noise (5 voxels, and ok), with 9 the tip of half a circle of 2.7 voxels stayed 0.55 voxel off."""
 
 
 def smoothness(controls: Array, knot: float, voxel: float) -> Array:
     """Inverse of the prior's covariance (3 k, 3 k) of control points (k, 3) about ``knot`` mm apart.
 
     Its tails are Cauchy's: half a circle of 4 voxels has third differences of 9 standard deviations. A Gaussian prior
-    straightened it, and its tip lay 0.23 voxel outwards.
+    straightened it, and its tip lay 0.2 voxel outwards.
     """
     loose = STIFFNESS * min(1.0, knot / (FULL_KNOT * voxel)) ** 3 * voxel
     block = _heavy_tailed(controls, 3, loose)
@@ -30,4 +33,4 @@ def _heavy_tailed(controls: Array, order: int, spread: float) -> Array:
     """The same (k, k) of one axis, of differences ``spread`` large: weighted anew as large as they are now."""
     difference = np.diff(np.eye(len(controls)), n=order, axis=0)
     size = np.sum((difference @ controls) ** 2, axis=1) / spread**2
-    return np.asarray(difference.T @ (difference / (spread**2 * (1.0 + size / 3.0))[:, None]))
+    return np.asarray(difference.T @ (difference / (spread**2 * (1.0 + size / TAIL))[:, None]))
