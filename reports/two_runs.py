@@ -139,6 +139,8 @@ class Verdict:
         closed = f" What closes the gate, the worst first: {by}." * bool(by and self.word in ("worse", "moved"))
         alone = " No error of a simulated wire is worse than is allowed." * self.frames.beside_errors
         pooled = f" Pooled: {self.paired}" * bool(self.paired)
+        # WORSE stood beside "no difference is shown", as if one of the two were wrong
+        pooled += "; it is single frames that close the gate" * bool(self.paired and closed and self.judged != "worse")
         verdict = f"Verdict: {self.word.upper()}.{closed}{alone if self.judged != 'worse' else ''}{pooled}\n"
         parts.insert(1 if self.differs else 0, verdict)
         parts[:0] = [f"{self.alike[0].upper()}{self.alike[1:]}.\n"] if self.alike else []

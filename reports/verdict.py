@@ -28,11 +28,14 @@ def headline(
 ) -> tuple[str, list[str]]:
     """The ``verdict`` as a page has it: what comes first, and the sentences of the list below.
 
-    Ten lines, a whole screen of a telephone, stood before the first number. defined : whether it says what the
+    Ten lines, a whole screen of a telephone, stood before the first number. defined : whether the list says what the
     predictor is, which a page of several simulators says once for all.
     """
-    said = list(_sentences(statistics, simulator, doubt, defined=defined))
-    return " ".join(text for text, first in said if first), [text for text, first in said if not first]
+    said = list(_sentences(statistics, simulator, doubt, defined=False))
+    more, rival = [text for text, first in said if not first], statistics.get("strongest_null")
+    if defined and said and number(statistics.get("skill_strongest")) != NOTHING:
+        more.append(f"The predictor {predictor_label(str(rival))!r} is {meaning_of_rival(str(rival))}.")
+    return " ".join(text for text, first in said if first), more
 
 
 def _sentences(
@@ -42,10 +45,9 @@ def _sentences(
     if doubt.copied:
         yield f"{doubt.copied}.", True
         return
-    rms = number(statistics.get("rms_mm"))
+    rms, true = (_mm(statistics.get(key)) for key in ("rms_mm", "truth_rms_mm"))
     if rms == NOTHING:
         return
-    true = number(statistics.get("truth_rms_mm"))
     against, *weaker = _against(statistics, defined=defined)
     again = f"But {TWINS} that was scanned again, and count as several: see the warnings." * bool(doubt.twins)
     said = [
@@ -71,8 +73,13 @@ def _far(statistics: Mapping[str, Any], simulator: str, rms: str) -> str:
     sentence = f"{f'On {some} alone t' if some else 'T'}{whose} lies {rms} mm (rms) from the traced one"
     few = _over_few(statistics)
     sentence += f", 95 % interval {ends} mm" + f" (wide: {few})" * bool(few) if ends else ""
-    tail = number(statistics.get("p95_mm"))
+    tail = _mm(statistics.get("p95_mm"))
     return sentence + (f"; 95 % of its points lie within {tail} mm." if tail != NOTHING else ".")
+
+
+def _mm(value: Any) -> str:
+    """A length in words; one below a nanometre is rounding, and was 2.35e-16 mm."""
+    return "0" if abs(value_of(value)) < 1e-6 else number(value)
 
 
 def _warned(doubt: Doubt) -> str:

@@ -150,6 +150,9 @@ def _keep_what_is_seen(out: Path, found: Sequence[Result], among: Sequence[Found
         write_json(out / AMONG, {"assumptions": assumed, "doubts": doubts})
 
 
+PLACE = "cases/"
+
+
 def _judged(
     out: Path, asked: Sequence[str], overall: Mapping[str, Any], scored: Sequence[Found]
 ) -> tuple[dict[str, str], list[str]]:
@@ -174,7 +177,8 @@ def _judged(
             told[one.asked] += _worst(scored, one.column)
         opened += [] if why else [one.open(overall)]
     write_json(out / GATES, {"closed": [why for why in told.values() if why], "open": opened})
-    return told, opened
+    # on its own page a place is relative to that; on the terminal to where the command ran
+    return {asked: why.replace(f" {PLACE}", f" {out.as_posix()}/{PLACE}") for asked, why in told.items()}, opened
 
 
 def _worst(scored: Sequence[Found], column: str) -> str:
@@ -190,7 +194,7 @@ def _worst(scored: Sequence[Found], column: str) -> str:
     if not known:
         return ""
     case, frame, value = max(known, key=lambda row: sign * row[2])
-    return f"; the worst: case {case} frame {frame} ({name} {value:.4g}), cases/{case}/report.html"
+    return f"; the worst: case {case} frame {frame} ({name} {value:.4g}), {PLACE}{case}/report.html"
 
 
 def _times(out: Path, found: Sequence[Result]) -> tuple[pd.DataFrame, float]:

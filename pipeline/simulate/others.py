@@ -146,17 +146,26 @@ ENDS_EARLY = 0.75
 
 
 def not_to_depth(
-    length_mm: float, depth_mm: float, tolerance_mm: float, stated: str = "mm", *, others_fit: bool = False
+    length_mm: float,
+    depth_mm: float,
+    tolerance_mm: float,
+    stated: str = "mm",
+    *,
+    others_fit: bool = False,
+    lagging: bool = False,
 ) -> str:
     """Why a wire does not have this depth, with a guess at why not; empty where it does.
 
     stated : see ``oddity``.     others_fit : wires of other frames, stated in this unit, have their depths.
+    lagging : wires have the depths of other frames, so that this one is whole.
     """
     if abs(length_mm - depth_mm) <= tolerance_mm:
         return ""
     unit = unit_of(depth_mm / max(length_mm, 1e-9), SAME, stated)
     hint = f"; is it in {unit}?" if unit and not others_fit else ""
-    if others_fit and length_mm < ENDS_EARLY * depth_mm:
+    if lagging:
+        hint = "; wires have the depths of other frames: is each file that of its frame?"
+    elif others_fit and length_mm < ENDS_EARLY * depth_mm:
         hint = "; wires of other frames are as long as these are deep: does its file end early?"
     return f"it is {length_mm:.3g} mm long from the entry on, the frame {depth_mm:.2f} mm deep{hint}"
 

@@ -281,6 +281,8 @@ def test_a_unit_that_a_file_states_wrongly_is_told_as_it_is(tmp_path: Path) -> N
     assert not_to_depth(40e3, 40.0, 2.0, found.unit).endswith("is it in mm?")
     assert not_to_depth(4.0, 40.0, 2.0).endswith("is it in cm?")
     assert not_to_depth(4.0, 40.0, 2.0, others_fit=True).endswith("does its file end early?"), "a unit would be of all"
+    shifted = not_to_depth(20.0, 40.0, 2.0, others_fit=True, lagging=True)
+    assert shifted.endswith("wires have the depths of other frames: is each file that of its frame?"), "none ends early"
     assert not_to_depth(36.0, 40.0, 2.0, others_fit=True).endswith("40.00 mm deep")
 
 

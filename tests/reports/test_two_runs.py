@@ -152,6 +152,7 @@ def test_the_verdict_follows_what_differs_and_ends_the_text(
     assert re.search(
         r"closes the gate, the worst first: case b frame 2, tip_mm \S+ -> \S+ \(allowed 0.1\)\. Pooled", verdict
     )
+    assert verdict.endswith("; it is single frames that close the gate"), "it stood beside 'no difference is shown'"
 
 
 def test_one_number_that_became_worse_does_not_hide_that_the_errors_are_smaller(

@@ -233,6 +233,12 @@ def test_traces_off_the_scans_come_first_and_no_roll_is_advised() -> None:
     assert (good["text"], good["look"]) == ("ok, 1 warning", "poor")
 
 
+def test_rounding_is_no_length() -> None:
+    """A wire beside itself lay "2.35e-16 mm" from the true one."""
+    said = verdict({"rms_mm": 0.2, "truth_rms_mm": 2.35e-16})
+    assert said.endswith("From the true wire it lies 0 mm.")
+
+
 def test_a_page_begins_with_three_sentences_and_says_each_definition_once() -> None:
     """Ten lines, a whole screen of a telephone, stood before the first number."""
     row = {"rms_mm": 0.36, "trace_sigma_mm": 0.3, "share_beyond_2u": 0.4, "frames": 4, "frames_ok": 3}

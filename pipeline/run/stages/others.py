@@ -46,8 +46,12 @@ def frames_of_others(run: Context, known: Known) -> tuple[Frame, ...]:
     with log.timed("simulate"):
         files = read_wires(case.simulated.files, len(known.frames), case.simulated.space, case.simulated.unit)
         pairs = list(zip(known.frames, files, strict=True))
-        fit = {file.unit for frame, file in pairs if _fits(run, known, frame, file)}
-        frames = [_taken(run, known, frame, file, others_fit=file.unit in fit) for frame, file in pairs]
+        lengths = np.array([_length_mm(known, file) for file in files])
+        depths = np.array([frame.depth_mm for frame in known.frames])
+        near = np.abs(lengths - depths) <= run.config.trace.length_tolerance_mm
+        fit = {file.unit for file, so in zip(files, near, strict=True) if so}
+        lag = bool(numbered_otherwise(lengths, depths))
+        frames = [_taken(run, known, *pair, others_fit=pair[1].unit in fit, lagging=lag) for pair in pairs]
     log.assumptions.append(
         f"the simulated wires are another simulator's: {_listed(files)}; their depth counts from the clamp's plane"
     )
@@ -91,15 +95,14 @@ def _in_another_order(frames: Sequence[Frame]) -> list[str]:
     ]
 
 
-def _fits(run: Context, known: Known, frame: Frame, file: OtherFile) -> bool:
-    """Whether a wire is as long as its frame is deep."""
+def _length_mm(known: Known, file: OtherFile) -> float:
+    """A wire's length from the clamp on; NaN where there is none."""
     if file.points_mm is None:
-        return False
-    length = float(arc_length(begun(file.points_mm, known.held.entry_mm, known.held.direction))[-1])
-    return abs(length - frame.depth_mm) <= run.config.trace.length_tolerance_mm
+        return float("nan")
+    return float(arc_length(begun(file.points_mm, known.held.entry_mm, known.held.direction))[-1])
 
 
-def _taken(run: Context, known: Known, frame: Frame, file: OtherFile, *, others_fit: bool) -> Frame:
+def _taken(run: Context, known: Known, frame: Frame, file: OtherFile, *, others_fit: bool, lagging: bool) -> Frame:
     case, clamp = run.case, known.held
     if file.points_mm is None:
         status = FrameStatus.CURVE_MISSING if file.missing else FrameStatus.CURVE_UNUSABLE
@@ -118,7 +121,8 @@ def _taken(run: Context, known: Known, frame: Frame, file: OtherFile, *, others_
         return replace(found, status=own, sentence=sentence, stage="simulate", message=said)
     found = not_in_itself(found, self_overlap_mm(points, radius), radius, f"{file.name}: the wire")
     length = float(arc_length(points)[-1])
-    wrong = not_to_depth(length, frame.depth_mm, run.config.trace.length_tolerance_mm, file.unit, others_fit=others_fit)
+    tolerance_mm, told = run.config.trace.length_tolerance_mm, {"others_fit": others_fit, "lagging": lagging}
+    wrong = not_to_depth(length, frame.depth_mm, tolerance_mm, file.unit, **told)
     return found.failed("simulate", FrameStatus.NOT_TO_DEPTH, f"{file.name}: {wrong}") if wrong else found
 
 
