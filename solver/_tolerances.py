@@ -84,6 +84,10 @@ PARALLEL = 1e-6
 CLOSED_FORM_ANGLE = 0.2
 """Largest turn of a segment in one sweep of the closed form, rad: its model is linear in the turn."""
 CLOSED_FORM_SMALLEST = 1e-12
+RUBBING_WAITS = 8
+"""Steps with friction that are taken after one that failed before a longer one is tried. In lumens 0.05 to 0.07 mm
+wider than the wire every step of 0.1 mm failed, in 200 iterations, and each of half its length took a few: tried after
+every single one, they used up what a depth of 4 mm may take."""
 """Smallest share of the closed form's own step that is tried before the sweep counts as stalled."""
 CLOSED_FORM_IDLE_ANGLE = 3e-11
 """A moment that would turn the stiffest joint by this angle, rad, is nothing: below it the energy by which the closed

@@ -19,7 +19,10 @@ class Status(Enum):
     """Outcome of one depth; the name is its identifier, the value its sentence."""
 
     CONVERGED = "the wire is at rest: a minimum of the energy within solver.tolerance"
-    MAX_ITERATIONS = "stopped at the iteration limit; raise solver.max_iterations or loosen solver.tolerance"
+    MAX_ITERATIONS = (
+        "stopped at the iteration limit; raise solver.max_iterations, loosen solver.tolerance or, with friction, take "
+        "solver.step_mm = 0.02"
+    )
     STALLED = (
         "the energy can no longer be lowered but the wire is not at rest within solver.tolerance; "
         "loosen solver.tolerance, or lower the ratio of wall to bending stiffness"

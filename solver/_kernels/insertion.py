@@ -115,7 +115,8 @@ def adapt_step(handle: Any, outcome: int, iterations: int, limit: float) -> tupl
     least = handle.introducer.finest if handle.problem.friction.coefficient > 0.0 else 1.0
     helps = at.shrink > (least if outcome == data.LEFT_GRID else tol.SMALLEST_STEP) and outcome != data.NON_FINITE
     if outcome == data.CONVERGED:
-        at.shrink = min(1.0, 2 * at.shrink)
+        at.waits = max(at.waits - 1, 0)
+        at.shrink = min(1.0, 2 * at.shrink) if at.waits == 0 else at.shrink
     elif outcome == data.ROUGH:
         at.shrink = max(tol.REFINE * at.shrink, handle.introducer.finest)
     elif helps and at.refining_failed == 0.0 and not math.isnan(at.rough_depth) and outcome != data.THROUGH_WALL:
@@ -124,6 +125,7 @@ def adapt_step(handle: Any, outcome: int, iterations: int, limit: float) -> tupl
     elif helps:
         at.shrink *= 0.5
     return outcome == data.CONVERGED or outcome == data.ROUGH or helps, outcome
+        at.waits = tol.RUBBING_WAITS if handle.problem.friction.coefficient > 0.0 else 0
 
 
 @merged

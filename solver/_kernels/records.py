@@ -78,7 +78,8 @@ PLACE = record(
     *((name, float) for name in ("refining_failed", "rough_depth", "rough_roll", "rough_catheter")),
     *((name, float) for name in ("rough_since_doubt", "rough_pivot")),
     *((name, float) for name in ("push", "torque", "dissipated", "since_doubt", "rubbed")),
-    *((name, float) for name in ("catheter", "goal", "next", "pull", "stored")),
+    *((name, float) for name in ("catheter", "goal", "next", "pull", "stored", "passed", "hind")),
+    ("waits", np.int64),
     ("snaps", np.int64),
 )
 """Where an insertion is. inserted, roll, energy : mm beyond the entry, degrees, N mm.     shrink : share of the longest
@@ -88,6 +89,7 @@ refining_failed : 1 where short steps to where a rough one led failed: then long
 
 push, torque : the hand's there, N and N mm.     dissipated, rubbed : lost of its work on the way to this depth, in all
 and by friction, N mm.     since_doubt : way since the wire snapped or was about to, mm.     snaps : number on the way.
+waits : steps to take before a longer one is tried again.
 rough_depth, rough_roll, rough_catheter : where a rough step led that is being taken again; nan where there is none.
 rough_since_doubt : what since_doubt was before it.     rough_pivot : pivot above which it counts that long and short
 steps agree.
