@@ -64,7 +64,9 @@ class Snap(NamedTuple):
 
 
 _NAMES = PLACE.names or ()
-_OF_PLACE = itemgetter(*map(_NAMES.index, ("energy", "dissipated", "since_doubt", "rubbed", "stored", "snaps")))
+_OF_PLACE = itemgetter(
+    *map(_NAMES.index, ("energy", "dissipated", "since_doubt", "rubbed", "stored", "passed", "snaps"))
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,6 +103,9 @@ class Solution:
 
     joints_mm: Array
     frames: Array
+    passed_itself_mm : the least depth at which a strand of the wire passed through another one, which no energy
+    forbids; inf where none did. It stays until the wire is pulled back so far that the hind one of the strands has left
+    the lumen: until then the wire may lie as no real one could, free of itself as it is.
     energy_N_mm: float
     bending_energy_N_mm: float
     wall_energy_N_mm: float
@@ -125,6 +130,7 @@ class Solution:
     @classmethod
     def assembled(
         cls, arrays: list[Array], notes: tuple[Any, ...], snaps: Any, ended: tuple[Status, int, float, float, float]
+    passed_itself_mm: float = math.inf
     ) -> Self:
         """A solution from joints, frames and forces, and what the kernels noted.
 
@@ -132,7 +138,7 @@ class Solution:
         first ``PLACE.snaps`` are valid.     ended : status, iterations, depth, mm, roll, degrees, wire's radius, mm.
         """
         place, (start, penetration, push, force, torque, *_, pivot), (bending, wall, *_), counts = notes
-        energy, dissipated, since_doubt, rubbed, stored, snapped = _OF_PLACE(place)
+        energy, dissipated, since_doubt, rubbed, stored, passed, snapped = _OF_PLACE(place)
         reaction = np.array(force)
         for array in (*arrays, reaction):
             array.setflags(write=False)
@@ -165,6 +171,7 @@ class Solution:
         return solution
 
     @property
+            passed_itself_mm=passed,
     def work(self) -> Mapping[str, float]:
         """Counters of what was computed and what was proven unnecessary, by name."""
         work = {name: float(count) for name, count in zip(WORK, self.counts, strict=False)}

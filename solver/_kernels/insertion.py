@@ -17,6 +17,7 @@ from solver._kernels.forces import contact_forces, copy_state, forget_forces, fu
 from solver._kernels.forks import other_side
 from solver._kernels.friction import anchor_friction, friction_loss, settle_friction
 from solver._kernels.minimise import relax_with_friction
+from solver._kernels.passage import note_passage
 from solver._kernels.septum import through_wall
 from solver._kernels.shaft import anchor_shaft, loss_by_turning, settle_shaft
 from solver._kernels.sleeve import put_over, stored_energy
@@ -124,8 +125,8 @@ def adapt_step(handle: Any, outcome: int, iterations: int, limit: float) -> tupl
         at.refining_failed, at.shrink = 1.0, 1.0
     elif helps:
         at.shrink *= 0.5
-    return outcome == data.CONVERGED or outcome == data.ROUGH or helps, outcome
         at.waits = tol.RUBBING_WAITS if handle.problem.friction.coefficient > 0.0 else 0
+    return outcome == data.CONVERGED or outcome == data.ROUGH or helps, outcome
 
 
 @merged
@@ -176,6 +177,8 @@ def accept_or_revert(
     elif outcome == data.CONVERGED and handle.report[0].pivot < tol.CRITICAL:
         at.since_doubt = 0.0
     if laid > 0 or outcome == data.CONVERGED:
+        if laid == 0:
+            note_passage(problem, at, k, depth, handle.table.segment)
         note_change(problem, data.CURRENT, k)
         at.last_step, at.last_turn = depth - at.inserted, roll - at.roll
         at.inserted, at.roll, at.energy = depth, roll, energy

@@ -95,6 +95,8 @@ rough_since_doubt : what since_doubt was before it.     rough_pivot : pivot abov
 steps agree.
 catheter, goal, next : where the catheter's tip is, is to go, and goes in this step, mm beyond the entry.     pull : the
 force of its hand, N.     stored : energy that it keeps in the wire, N mm, a part of ``energy``.
+passed : least depth at which the wire passed through itself, mm, inf where it has not.     hind : wire beyond the hind
+strand there, mm, the least of all passages: pulled back further, the wire is free of them.
 """
 SNAP = record(*((name, float) for name in ("from_mm", "to_mm", "released_N_mm", "moved_mm", "other_mm")))
 """An event: depths before and after, energy released, largest way of a joint, and result of ``forks.other_side``."""
