@@ -143,8 +143,7 @@ class Solution:
         """
         place, (start, penetration, push, force, torque, *_, pivot), (bending, wall, *_), counts = notes
         energy, dissipated, since_doubt, rubbed, stored, passed, snapped = _OF_PLACE(place)
-        reaction = np.array(force)
-        for array in (*arrays, reaction):
+        for array in (*arrays, reaction := np.array(force)):
             array.setflags(write=False)
         solution = object.__new__(cls)
         # a frozen dataclass sets its fields one by one, which takes 2 µs of the 40 that a step may take

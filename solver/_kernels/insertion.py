@@ -229,9 +229,7 @@ def longest_step(
     problem: Problem, table: WireTable, introducer: Introducer, depth: float, ahead: float, turn: float
 ) -> float:
     """Fraction of the way that one step may take: the longest step and roll, and what the tip can see."""
-    fraction = 1.0
-    if turn != 0.0:
-        fraction = min(fraction, introducer.turn / abs(turn))
+    fraction = min(1.0, introducer.turn / abs(turn)) if turn != 0.0 else 1.0
     if ahead != 0.0:
         longest = min(introducer.step, abs(ahead))
         if ahead > 0.0 and problem.stiffness > 0.0:
@@ -272,9 +270,8 @@ def begin_step(handle: Any, depth: float, roll: float) -> int:
         lay_along(problem, table, introducer, was, k, first, depth - inserted)
         return k
     forget_forces(report)
-    report.start = 0.0
     parts = problem.state.energies[data.CURRENT]
-    parts.bending = parts.wall = parts.load = parts.friction = 0.0
+    report.start = parts.bending = parts.wall = parts.load = parts.friction = 0.0
     return k
 
 
