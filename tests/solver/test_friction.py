@@ -271,7 +271,7 @@ def test_a_wire_in_a_tight_lumen_keeps_to_the_steps_that_succeed() -> None:
     grid = sampled(lambda p: cKDTree(axis).query(p)[0] - 0.228, 0.2, low, high)
     wire = GuideWire(1.0, 0.18, [[0, 0.5], [6, 0.5], [14, 6.0]], [[0, 0.07], [6, 0.07], [6, 0.0]])
     wall = VesselWall(grid, 98.0, friction=0.1)
-    insertion, fine = (Insertion(wire, wall, axis[0], [0, 0, 1], **how) for how in ({}, {"step_mm": 0.02}))
+    insertion, fine = (Insertion(wire, wall, axis[0], [0, 0, 1], step_mm=step) for step in (1.0, 0.02))
     found, other = last(insertion, [4.0, 8.0, 12.0]), last(fine, [4.0, 8.0, 12.0])
     assert found.converged
     np.testing.assert_allclose(found.joints_mm, other.joints_mm, rtol=0.0, atol=1e-3)
