@@ -40,8 +40,8 @@ class FrameStatus(Enum):
         "set a shorter solver.segment_mm, or auto"
     )
     SELF_CONTACT = (
-        "the simulated wire passes through itself, as its parts do not push each other in this model; do not trust its "
-        "shape and force from here on"
+        "the simulated wire passes through itself, or did on its way here, as its parts do not push each other in this "
+        "model; do not trust its shape and force from there on"
     )
     CURVE_MISSING = "the other simulator has no wire for this frame, which counts as one that it failed in"
     CURVE_UNUSABLE = "the other simulator's wire cannot be used; the message names the file and the reason"

@@ -38,6 +38,11 @@ MOST_JOINTS = 1_000_000
 """Joints of the longest wire that may be asked for: its arrays fill 1.5 GB."""
 USUAL_JOINTS = 20_000
 """Joints of the longest wire accepted unless something else is said."""
+TURNS_BACK = 2.0
+"""Turn of the wire, rad, from which on two strands may meet: on the way pi at least, at a step's end less by what the
+step takes off it. Summed as chords, which are 1 % less at 30 degrees a joint."""
+PASSAGE_HALVINGS = 30
+"""Halvings of a step to find when the ends of two strands lie in one plane: to 1e-9 of it."""
 MATCH_DEPTH_MM = 1e-9
 """Depths closer than this are the same depth."""
 SAME_LENGTH_MM = 1e-13
@@ -79,6 +84,10 @@ FRICTION_FASTER, FRICTION_CREEPS = 1.5, 0.9
 """Factor on the share where a change is more than this part of the one before."""
 FRICTION_ROUNDS = 200
 """Relaxations allowed for the contact loads of one step to settle; of a wire that is let go some thirty."""
+RUBBING_WAITS = 8
+"""Steps with friction that are taken after one that failed before a longer one is tried. In lumens 0.05 to 0.07 mm
+wider than the wire every step of 0.1 mm failed, in 200 iterations, and each of half its length took a few: tried after
+every single one, they used up what a depth of 4 mm may take."""
 PARALLEL = 1e-6
 """Sine of the angle below which a material axis counts as parallel to the wire."""
 CLOSED_FORM_ANGLE = 0.2

@@ -127,4 +127,6 @@ def _solutions(plan: Plan, w: int, work: Workspace) -> list[Solution]:
         found.append(Solution.assembled(arrays, tuple(notes), plan.snaps[w, n], ended))
         if work.at_entry is not None:
             work.at_entry.add(found[-1])
+        # the wire goes on from here alone
+        work.k = k
     return found

@@ -34,7 +34,7 @@ RUBBING_TURN_DEG = 1.0
 a curved tip is 0.26 mm off with 15, 0.09 with 5 and 0.015 with 1. A shaft that rubs and twists lags its hand by an
 equation of the same kind: with steps of 1 mm and 15 degrees the tip was up to 3 degrees off (0.28 mm)."""
 FINEST_MM = Range(LENGTH_MM.least, math.inf, "step_mm or more: no step is taken again")
-SHAFT_MM, SHAFT_N = Range(0.0, 1e6, "0 is no shaft"), Range(0.0, 1e6, "0 is no friction")
+SHAFT_MM, SHAFT_N = Range(0.0, 1e6, "0 is a shaft that does not twist"), Range(0.0, 1e6, "0 is no friction")
 ONE_AT_A_TIME = "finish one call before the next, or go on with insertion.clone()"
 
 
@@ -54,7 +54,8 @@ class Insertion:
     tip_load_N : (3,) a force on the tip that keeps its direction.     down : (3,) LPS, the direction of gravity; needed
     if the wire has a weight.     catheter : a tube over the wire, see ``to_depths``.
     shaft_mm : length of wire between the hand and the entry, the same at every depth. It twists with stiffness GJ, so
-    the tip lags behind the hand.     shaft_friction_N : force at its surface that it takes to slide or turn that shaft.
+    the tip lags behind the hand; one of 0 mm does not twist.
+    shaft_friction_N : force at its surface that it takes to slide or turn that shaft, whatever its length.
 
     Raises ValueError for arguments that cannot be used. What goes wrong while the wire is pushed is a ``Status`` of the
     solution. An insertion has one state and does one thing at a time (see ``to_depths``): use ``clone`` to try several

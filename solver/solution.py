@@ -1,5 +1,6 @@
 """What a relaxation returns: how it ended, every status with the sentence that the user reads, and the wire."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
@@ -19,7 +20,10 @@ class Status(Enum):
     """Outcome of one depth; the name is its identifier, the value its sentence."""
 
     CONVERGED = "the wire is at rest: a minimum of the energy within solver.tolerance"
-    MAX_ITERATIONS = "stopped at the iteration limit; raise solver.max_iterations or loosen solver.tolerance"
+    MAX_ITERATIONS = (
+        "stopped at the iteration limit; raise solver.max_iterations, loosen solver.tolerance or, with friction, take "
+        "solver.step_mm = 0.02"
+    )
     STALLED = (
         "the energy can no longer be lowered but the wire is not at rest within solver.tolerance; "
         "loosen solver.tolerance, or lower the ratio of wall to bending stiffness"
@@ -61,7 +65,9 @@ class Snap(NamedTuple):
 
 
 _NAMES = PLACE.names or ()
-_OF_PLACE = itemgetter(*map(_NAMES.index, ("energy", "dissipated", "since_doubt", "rubbed", "stored", "snaps")))
+_OF_PLACE = itemgetter(
+    *map(_NAMES.index, ("energy", "dissipated", "since_doubt", "rubbed", "stored", "passed", "snaps"))
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +82,9 @@ class Solution:
     contact_force_N : (k + 1, 3), the force of the wall on the wire at each joint.
     reaction_force_N : (3,), the force of the introducer on the wire.     reaction_torque_N_mm : its torque about the
     axis.
-    push_force_N : the axial force of the hand, dU/d(depth).
+    push_force_N : the axial force of the hand, dU/d(depth). In lumens with less room for the wire than about a voxel it
+    is wrong, even of the wrong sign, with segments whose shapes are right; compare it with that of segments of
+    0.0625 mm.
     max_penetration_mm : deepest overlap of the wire's hull with the wall.
     counts : in the order of ``_kernels.records.COUNTERS``; ``work`` has them by name.
     start_energy_N_mm : the total energy at the start of the last relaxation.
@@ -90,10 +98,14 @@ class Solution:
     part of it. The work is integrated by the trapezium rule over each step, so where the push force jumps (a jump of
     rest curvature or stiffness passes the entry) it is off by half the jump times the step and may be negative. In
     ``relax`` no hand works and it is 0: friction_energy_N_mm is what friction took on the way from the start shape.
-    snaps : the snaps since the depth before.
+    snaps : the snaps since the depth before. A wound shaft that unwinds in one push may be among them.
     uncertain : shorter steps may lead elsewhere. Here, or a few mm before (longer while the wire stays soft), it
     snapped, was about to snap, took one of two equally good sides, or went elsewhere in long steps than in short ones.
+    A whip while rolling to which long and short steps lead alike is in snaps alone.
     radius_mm : the radius of the wire.
+    passed_itself_mm : the least depth at which a strand of the wire passed through another one, which no energy
+    forbids; inf where none did. It stays until the wire is pulled back so far that the hind one of the strands has left
+    the lumen: until then the wire may lie as no real one could, free of itself as it is.
     """
 
     joints_mm: Array
@@ -118,6 +130,7 @@ class Solution:
     snaps: tuple[Snap, ...] = ()
     uncertain: bool = False
     radius_mm: float = 0.0
+    passed_itself_mm: float = math.inf
 
     @classmethod
     def assembled(
@@ -129,9 +142,8 @@ class Solution:
         first ``PLACE.snaps`` are valid.     ended : status, iterations, depth, mm, roll, degrees, wire's radius, mm.
         """
         place, (start, penetration, push, force, torque, *_, pivot), (bending, wall, *_), counts = notes
-        energy, dissipated, since_doubt, rubbed, stored, snapped = _OF_PLACE(place)
-        reaction = np.array(force)
-        for array in (*arrays, reaction):
+        energy, dissipated, since_doubt, rubbed, stored, passed, snapped = _OF_PLACE(place)
+        for array in (*arrays, reaction := np.array(force)):
             array.setflags(write=False)
         solution = object.__new__(cls)
         # a frozen dataclass sets its fields one by one, which takes 2 µs of the 40 that a step may take
@@ -158,6 +170,7 @@ class Solution:
             snaps=tuple(Snap(*snaps.item(n)) for n in range(snapped)) if snapped else (),
             uncertain=since_doubt < tol.DOUBT_LASTS_MM,
             radius_mm=ended[4],
+            passed_itself_mm=passed,
         )
         return solution
 

@@ -98,6 +98,7 @@ class Workspace:
         self.counts = self.counters.view(np.int64)
         self.place["shrink"], self.place["since_doubt"] = 1.0, np.inf
         self.place["rough_depth"] = np.nan
+        self.place["passed"] = self.place["hind"] = np.inf
         self.snaps, self.held_load = np.zeros(SNAPS_KEPT, records.SNAP), np.zeros(3)
         self.report = np.zeros(3, records.REPORT)
         self._grow(16)

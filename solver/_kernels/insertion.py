@@ -17,6 +17,7 @@ from solver._kernels.forces import contact_forces, copy_state, forget_forces, fu
 from solver._kernels.forks import other_side
 from solver._kernels.friction import anchor_friction, friction_loss, settle_friction
 from solver._kernels.minimise import relax_with_friction
+from solver._kernels.passage import note_passage
 from solver._kernels.septum import through_wall
 from solver._kernels.shaft import anchor_shaft, loss_by_turning, settle_shaft
 from solver._kernels.sleeve import put_over, stored_energy
@@ -115,7 +116,8 @@ def adapt_step(handle: Any, outcome: int, iterations: int, limit: float) -> tupl
     least = handle.introducer.finest if handle.problem.friction.coefficient > 0.0 else 1.0
     helps = at.shrink > (least if outcome == data.LEFT_GRID else tol.SMALLEST_STEP) and outcome != data.NON_FINITE
     if outcome == data.CONVERGED:
-        at.shrink = min(1.0, 2 * at.shrink)
+        at.waits = max(at.waits - 1, 0)
+        at.shrink = min(1.0, 2 * at.shrink) if at.waits == 0 else at.shrink
     elif outcome == data.ROUGH:
         at.shrink = max(tol.REFINE * at.shrink, handle.introducer.finest)
     elif helps and at.refining_failed == 0.0 and not math.isnan(at.rough_depth) and outcome != data.THROUGH_WALL:
@@ -123,6 +125,7 @@ def adapt_step(handle: Any, outcome: int, iterations: int, limit: float) -> tupl
         at.refining_failed, at.shrink = 1.0, 1.0
     elif helps:
         at.shrink *= 0.5
+        at.waits = tol.RUBBING_WAITS if handle.problem.friction.coefficient > 0.0 else 0
     return outcome == data.CONVERGED or outcome == data.ROUGH or helps, outcome
 
 
@@ -174,6 +177,8 @@ def accept_or_revert(
     elif outcome == data.CONVERGED and handle.report[0].pivot < tol.CRITICAL:
         at.since_doubt = 0.0
     if laid > 0 or outcome == data.CONVERGED:
+        if laid == 0:
+            note_passage(problem, at, k, depth, handle.table.segment)
         note_change(problem, data.CURRENT, k)
         at.last_step, at.last_turn = depth - at.inserted, roll - at.roll
         at.inserted, at.roll, at.energy = depth, roll, energy
@@ -224,9 +229,7 @@ def longest_step(
     problem: Problem, table: WireTable, introducer: Introducer, depth: float, ahead: float, turn: float
 ) -> float:
     """Fraction of the way that one step may take: the longest step and roll, and what the tip can see."""
-    fraction = 1.0
-    if turn != 0.0:
-        fraction = min(fraction, introducer.turn / abs(turn))
+    fraction = min(1.0, introducer.turn / abs(turn)) if turn != 0.0 else 1.0
     if ahead != 0.0:
         longest = min(introducer.step, abs(ahead))
         if ahead > 0.0 and problem.stiffness > 0.0:
@@ -267,9 +270,8 @@ def begin_step(handle: Any, depth: float, roll: float) -> int:
         lay_along(problem, table, introducer, was, k, first, depth - inserted)
         return k
     forget_forces(report)
-    report.start = 0.0
     parts = problem.state.energies[data.CURRENT]
-    parts.bending = parts.wall = parts.load = parts.friction = 0.0
+    report.start = parts.bending = parts.wall = parts.load = parts.friction = 0.0
     return k
 
 

@@ -78,7 +78,8 @@ PLACE = record(
     *((name, float) for name in ("refining_failed", "rough_depth", "rough_roll", "rough_catheter")),
     *((name, float) for name in ("rough_since_doubt", "rough_pivot")),
     *((name, float) for name in ("push", "torque", "dissipated", "since_doubt", "rubbed")),
-    *((name, float) for name in ("catheter", "goal", "next", "pull", "stored")),
+    *((name, float) for name in ("catheter", "goal", "next", "pull", "stored", "passed", "hind")),
+    ("waits", np.int64),
     ("snaps", np.int64),
 )
 """Where an insertion is. inserted, roll, energy : mm beyond the entry, degrees, N mm.     shrink : share of the longest
@@ -88,11 +89,14 @@ refining_failed : 1 where short steps to where a rough one led failed: then long
 
 push, torque : the hand's there, N and N mm.     dissipated, rubbed : lost of its work on the way to this depth, in all
 and by friction, N mm.     since_doubt : way since the wire snapped or was about to, mm.     snaps : number on the way.
+waits : steps to take before a longer one is tried again.
 rough_depth, rough_roll, rough_catheter : where a rough step led that is being taken again; nan where there is none.
 rough_since_doubt : what since_doubt was before it.     rough_pivot : pivot above which it counts that long and short
 steps agree.
 catheter, goal, next : where the catheter's tip is, is to go, and goes in this step, mm beyond the entry.     pull : the
 force of its hand, N.     stored : energy that it keeps in the wire, N mm, a part of ``energy``.
+passed : least depth at which the wire passed through itself, mm, inf where it has not.     hind : wire beyond the hind
+strand there, mm, the least of all passages: pulled back further, the wire is free of them.
 """
 SNAP = record(*((name, float) for name in ("from_mm", "to_mm", "released_N_mm", "moved_mm", "other_mm")))
 """An event: depths before and after, energy released, largest way of a joint, and result of ``forks.other_side``."""

@@ -115,6 +115,8 @@ def balance_work(handle: Any, k: int, reached: tuple[float, float, float]) -> Wo
     work = max(abs(push), abs(at.push)) * abs(ahead) + max(abs(torque), abs(at.torque)) * abs(turn)
     work += max(abs(pull), abs(at.pull)) * abs(onwards)
     large = tol.WORK_SHARE * work + tol.ENERGY_SHARE * max(abs(reached[2]), abs(at.energy)) + tol.LOSS_SHARE * rubbed
+    # where a wire just left the wall, the rounding of an energy of 0 was a snap of 1e-39 N mm
+    large += tol.ENERGY_FLOOR_ANGLE**2 * problem.chain.bend[k - 1] if k > 0 else 0.0
     change = abs((push - at.push) * ahead) + abs((torque - at.torque) * turn)
     way = max(abs(ahead), abs(onwards))
     share = max(way / introducer.step, abs(reached[1] - at.roll) / introducer.turn)

@@ -197,7 +197,11 @@ def test_a_wire_that_lies_in_itself_says_so_and_fails_its_frame() -> None:
     assert "self_overlap_mm" not in vars(wire)
     assert wire.self_overlap_mm == pytest.approx(0.36, abs=0.01)
     assert judged(Frame(0, simulated=wire), wire, 0.18).status == "self_contact"
-    assert next(Insertion(turned, None, [0, 0, 0], [0, 0, 1]).to_depths([6.0])).self_overlap_mm == 0.0
+    short = next(Insertion(turned, None, [0, 0, 0], [0, 0, 1]).to_depths([6.0]))
+    assert short.self_overlap_mm == 0.0
+    assert judged(Frame(0, simulated=short), short, 0.18).ok
+    passed = judged(Frame(0, simulated=short), replace(short, passed_itself_mm=5.04), 0.18)
+    assert (passed.status, passed.message) == ("self_contact", "the wire passed through itself at a depth of 5.0 mm")
 
 
 @pytest.mark.parametrize("over_mm", [0.0, 12.0])

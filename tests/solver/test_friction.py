@@ -7,10 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from solver import Grid, GuideWire, Insertion, Solution, Status, VesselWall
 from tests.later import later
-from tests.solver.scenes import bend_distance, bend_grid, held_by_friction, last, sampled
+from tests.solver.scenes import bend_distance, bend_grid, held_by_friction, last, sampled, winding
 
 Array = NDArray[np.float64]
 WIRE = GuideWire(1.0, 0.18, 10.0)
@@ -259,3 +260,18 @@ def test_where_friction_may_have_let_go_is_doubted_for_a_centimetre() -> None:
     ends = doubted[np.append(np.diff(doubted) > 1.5, True)]
     begins = doubted[np.insert(np.diff(doubted) > 1.5, 0, True)]
     assert all(end - begin > 7.0 or end == found[-1].depth_mm for begin, end in zip(begins, ends, strict=True))
+
+
+def test_a_wire_in_a_tight_lumen_keeps_to_the_steps_that_succeed() -> None:
+    """0.05 mm of room: steps of 0.1 mm fail there, and were tried again after every shorter one until 36,000 iterations
+    were spent at 7.15 mm.
+    """
+    axis = winding(np.random.default_rng([17, 27]), 12.0, 6.0, 1.2)
+    low, high = axis.min(axis=0) - 1.5, axis.max(axis=0) + 1.5
+    grid = sampled(lambda p: cKDTree(axis).query(p)[0] - 0.228, 0.2, low, high)
+    wire = GuideWire(1.0, 0.18, [[0, 0.5], [6, 0.5], [14, 6.0]], [[0, 0.07], [6, 0.07], [6, 0.0]])
+    wall = VesselWall(grid, 98.0, friction=0.1)
+    insertion, fine = (Insertion(wire, wall, axis[0], [0, 0, 1], step_mm=step) for step in (1.0, 0.02))
+    found, other = last(insertion, [4.0, 8.0, 12.0]), last(fine, [4.0, 8.0, 12.0])
+    assert found.converged
+    np.testing.assert_allclose(found.joints_mm, other.joints_mm, rtol=0.0, atol=1e-3)

@@ -308,6 +308,15 @@ def test_a_wall_shifted_by_a_smooth_offset_is_the_wall_of_the_sum() -> None:
     assert np.abs(wires[0].joints_mm - wires[2].joints_mm).max() > 0.005  # fifty times the tolerance above
 
 
+def test_a_wire_that_went_beside_others_is_whole_where_its_next_depth_is_refused() -> None:
+    """It had one joint, at the entry: its workspace did not know how far it had come."""
+    made = [Insertion(GuideWire(1.0, 0.18, 10.0), bend_wall(), [0, 0, 0], [0, 0, 1], max_joints=20) for _ in range(2)]
+    there = Insertions(made, threads=1).to_depths([15.0])[0][0]
+    refused = next(made[0].to_depths([25.0]))
+    assert refused.status is Status.TOO_LONG
+    np.testing.assert_array_equal(refused.joints_mm, there.joints_mm)
+
+
 def test_one_insertion_twice_and_no_threads_are_refused() -> None:
     insertion = Insertion(GuideWire(1.0, 0.18, 10.0), bend_wall(), [0, 0, 0], [0, 0, 1])
     with pytest.raises(ValueError, match="insertions"):

@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import math
+import pickle
 import tracemalloc
+from functools import cache
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.ndimage import gaussian_filter
 
+from solver import Grid, GuideWire, Insertion, Insertions, VesselWall
 from solver.self_contact import self_overlap_mm
 from tests.naive.passes import closest_mm
+from tests.naive.writhe import writhe
 
 RADIUS = 0.18
 
@@ -71,3 +76,42 @@ def test_all_pairs_of_dense_points_find_no_closer_pass(seed: int, segment: float
     narrow = closest_mm(joints, math.pi * RADIUS, step)
     assert 2 * RADIUS - wide - 1e-9 <= overlap + 1e-12 or wide == math.inf
     assert overlap <= max(2 * RADIUS - narrow, 0.0) + 2 * step
+
+
+@cache
+def sac() -> VesselWall:
+    """A sac of 6 mm radius behind an inlet of 1 mm radius that enters it 0.8 mm aside."""
+    axes = np.arange(-9.0, 9.0, 0.4), np.arange(-9.0, 9.0, 0.4), np.arange(-20.0, 9.0, 0.4)
+    x, y, z = np.meshgrid(*axes, indexing="ij")
+    tube = np.maximum(np.hypot(x + 0.23, y - 0.75) - 1.0, z)
+    sphere = 0.75 * (np.sqrt((x / 0.79) ** 2 + (y / 0.75) ** 2 + (z / 0.94) ** 2) - 6.0)
+    distance = gaussian_filter(np.minimum(sphere, tube), 0.7)
+    return VesselWall(Grid(distance, [0.4] * 3, [axes[0][0], axes[1][0], axes[2][0]]), 20.0)
+
+
+def in_sac() -> Insertion:
+    wire = GuideWire(0.5, RADIUS, [[0, 0.3], [20, 0.3], [40, 2.0]], [[0, 0.2], [15, 0.2], [15, 0.0]])
+    return Insertion(wire, sac(), [-0.23, 0.75, -14.0], [0, 0, 1])
+
+
+def test_a_wire_that_passed_through_itself_between_two_depths_says_so_from_there_on() -> None:
+    """At 55 mm it is at rest and free of itself, but one strand lies on the other side of another one."""
+    alone = in_sac()
+    before, after = alone.to_depths([45.0, 55.0], 160.0)
+    assert math.isinf(before.passed_itself_mm)
+    assert abs(writhe(after.joints_mm) - writhe(before.joints_mm)) == pytest.approx(2.0, abs=0.2)
+    assert (after.converged, after.self_overlap_mm) == (True, 0.0)
+    assert 49.0 < after.passed_itself_mm < 51.0
+    for twin in (alone.clone(), pickle.loads(pickle.dumps(alone))):
+        still, out = twin.to_depths([48.0, 5.0], 160.0)
+        assert still.passed_itself_mm <= after.passed_itself_mm, "both strands are in the sac still"
+        assert math.isinf(out.passed_itself_mm), "the hind strand is out"
+
+
+def test_wires_side_by_side_note_it_too() -> None:
+    beside = [in_sac(), in_sac()]
+    found = Insertions(beside, threads=1).to_depths([45.0, 55.0], [160.0, 280.0])
+    assert math.isinf(found[0][0].passed_itself_mm)
+    assert 49.0 < found[0][1].passed_itself_mm < 51.0
+    assert math.isinf(found[1][1].passed_itself_mm), "turned to another side, it does not"
+    assert next(beside[0].to_depths([54.0], 160.0)).passed_itself_mm == found[0][1].passed_itself_mm

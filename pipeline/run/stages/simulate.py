@@ -11,7 +11,7 @@ from pipeline.run.log import Log
 from pipeline.run.stages.clamp import clamp_of
 from pipeline.run.stages.clues import beside_clues, clues_of
 from pipeline.run.stages.covered import deep_in_itself_mm, too_thick
-from pipeline.run.stages.in_itself import not_in_itself
+from pipeline.run.stages.in_itself import not_in_itself, not_passed
 from pipeline.run.stages.known import Context, Frame, Known
 from pipeline.run.stages.others import frames_of_others
 from pipeline.run.stages.roll import with_fitted_roll
@@ -114,13 +114,13 @@ def _inserted(
 
 
 def judged(frame: Frame, wire: Solution, radius_mm: float, catheter: OverWire | None = None) -> Frame:
-    """The frame, failed where its wire is not at rest, cannot follow a bend, or lies in itself, as its catheter may."""
+    """The frame, failed where its wire is not at rest, cannot follow a bend, or lies or lay in itself."""
     if not wire.converged:
         return frame.failed("simulate", wire.status)
     turn = wire.largest_turn_deg
     if turn > LARGEST_JOINT_TURN_DEG:
         return frame.failed("simulate", FrameStatus.UNDER_RESOLVED, f"a joint is turned by {turn:.0f} degrees")
-    frame = not_in_itself(frame, wire.self_overlap_mm, radius_mm)
+    frame = not_passed(not_in_itself(frame, wire.self_overlap_mm, radius_mm), wire)
     if catheter is None:
         return frame
     what = f"the catheter of radius_mm = {catheter.radius_mm:g}"
