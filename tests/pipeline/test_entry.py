@@ -211,7 +211,7 @@ def known_of(curves: Sequence[Curve]) -> tuple[Any, Any]:
     ]
     log = SimpleNamespace(warnings=[], assumptions=[])
     lumen = SimpleNamespace(distance=SimpleNamespace(spacing_mm=np.full(3, VOXEL_MM)))
-    return SimpleNamespace(case=case, log=log), SimpleNamespace(frames=frames, vessel=lumen)
+    return SimpleNamespace(case=case, log=log), SimpleNamespace(frames=frames, vessel=lumen, off_the_scans=False)
 
 
 @pytest.mark.parametrize(
