@@ -17,7 +17,7 @@ from pipeline.run.helpers import nothing, shared
 from pipeline.run.inputs import Inputs, times_of
 from pipeline.run.log import CaseProgress, Log, Stage
 from pipeline.run.occupied import held
-from pipeline.run.provenance import code_state, package_version, peak_memory_mib, this_run
+from pipeline.run.provenance import COMPUTING, code_state, package_version, peak_memory_mib, this_run, versions
 from pipeline.run.stages import Context, Known, run_stages
 from pipeline.run.store import digest
 from pipeline.run.view import LumenFiles, write_view
@@ -69,8 +69,8 @@ class Job:
 
     @property
     def key(self) -> str:
-        """Cache key of what the result depends on: case, contents of files, settings, code, columns."""
-        code = (package_version(), hash_of(Path(__file__)))
+        """Cache key of what the result depends on: case, contents of files, settings, code, libraries, columns."""
+        code = (package_version(), hash_of(Path(__file__)), versions(COMPUTING))
         given = self.settings.calibrated and self.settings.calibrated[0]
         named = (self.simulator,) if self.simulator else ()  # the page names the simulator
         return digest((self.case, self.settings.config, given, self.until, code, ERRORS.columns, *named))

@@ -15,18 +15,9 @@ from typing import Any
 from pipeline.run import ledger
 from reports.records import read_json
 
-PACKAGES = [
-    "numpy",
-    "scipy",
-    "scikit-image",
-    "SimpleITK",
-    "pydicom",
-    "pandas",
-    "h5py",
-    "matplotlib",
-    "numba",
-    "pydantic",
-]
+COMPUTING = ("numpy", "scipy", "scikit-image", "SimpleITK", "pydicom", "h5py", "numba")
+"""Libraries on which results depend."""
+PACKAGES = (*COMPUTING, "pandas", "matplotlib", "pydantic")
 
 
 def package_version() -> str:
@@ -46,9 +37,9 @@ def _git(*args: str) -> str:
 
 
 @cache
-def versions() -> dict[str, str]:
+def versions(names: tuple[str, ...] = PACKAGES) -> dict[str, str]:
     """Of the libraries; read once a process: it takes 20 ms, and every case asks."""
-    return {name: version(name) for name in PACKAGES}
+    return {name: version(name) for name in names}
 
 
 def _processor() -> str:

@@ -20,7 +20,7 @@ from pydantic import BaseModel
 from pipeline import load
 from pipeline.model import Volume
 from pipeline.run.hashing import file_hash
-from pipeline.run.provenance import versions
+from pipeline.run.provenance import COMPUTING, versions
 from solver import Grid
 from solver._compile import hash_of
 
@@ -30,7 +30,7 @@ _known: WeakKeyDictionary[Grid, str] = WeakKeyDictionary()
 def key_of(stage: Callable[..., Any], *inputs: Any) -> str:
     """Key of what ``stage(*inputs)`` returns: its sources, the libraries, and its inputs' contents."""
     code = hash_of(Path(inspect.unwrap(stage).__code__.co_filename))
-    return hashlib.sha256(f"{stage.__qualname__} {code} {versions()} {digest(inputs)}".encode()).hexdigest()
+    return hashlib.sha256(f"{stage.__qualname__} {code} {versions(COMPUTING)} {digest(inputs)}".encode()).hexdigest()
 
 
 def digest(value: Any) -> str:

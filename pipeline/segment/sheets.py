@@ -21,7 +21,8 @@ from pipeline.segment.levels import GreyLevels, Index
 from solver.grid import Grid, read_only
 
 STEP = 2.5
-"""Voxels to either side at which a sheet's grey is compared: its blur, with the smoothing, has a deviation of 1.1."""
+"""Voxels to either side, 1.7 to 2.8 once they are whole ones, at which a sheet's grey is compared: its blur, with the
+smoothing, has a deviation of 1.1."""
 WAYS = [np.rint(STEP * way / np.linalg.norm(way)).astype(np.int64) for way in np.indices((3, 3, 3)).reshape(3, 27).T - 1
         if tuple(way) > (0, 0, 0)]  # fmt: skip
 """Steps across a sheet, of the 13 directions of a lattice."""
@@ -37,8 +38,8 @@ LEAST, WIDE = 100, 5.0
 """Voxels of a sheet at least, and over the square of its depth in voxels. At the crotch of 10 branches there are 37 to
 76, in uneven filling 3 times that square at most; between vessels that touch 126 and more, 16 times and more."""
 LEAST_AREA = 2.0
-"""Least area of an opening that a sheet fills, over the square of the vessel's radius: 0.2 to 1.0 at the crotch of
-branches, 3 to 15 between vessels that touch."""
+"""Least area of an opening that a sheet fills, in voxel faces, over the square of the vessel's radius: 0.2 to 1.0 at
+crotches of branches, 3 to 15 between vessels that touch."""
 NEXT_TO = 0.1
 """Depth in voxels that is left within a sheet, so that what lies on its two sides still meets there."""
 
@@ -56,7 +57,15 @@ def open_ones(
     sheet = sheets(scan, distance, corner, levels, taps) if even else None
     if sheet is None or not len(sheet):
         return seen
-    return max(seen, contacts(_parted(distance, sheet), LEAST_AREA), key=lambda found: sum(c.area_mm2 for c in found))
+    parted = contacts(_parted(distance, sheet), LEAST_AREA)
+    # an opening that both find is larger by the one or by the other
+    alone = [c for c in seen if all(np.linalg.norm(c.place_mm - o.place_mm) > _across(o) for o in parted)]
+    return (*parted, *alone) if parted else seen
+
+
+def _across(opening: Contact) -> float:
+    """Diameter, mm, of a round opening of that area."""
+    return 2.0 * float(np.sqrt(opening.area_mm2 / np.pi))
 
 
 def sheets(scan: Grid, distance: Grid, corner: Index, levels: GreyLevels, taps: NDArray[np.float32]) -> Index:
@@ -71,9 +80,11 @@ def sheets(scan: Grid, distance: Grid, corner: Index, levels: GreyLevels, taps: 
     # no brighter than the plateau: beside a wire everything is dark. The level's own may be a membrane's
     deep = share[depth[inner] > DEEP * voxel]
     grey = sparse_zeros(shape, np.float32)
-    grey.reshape(-1)[inner] = np.minimum(share, max(1.0, float(np.median(deep))) if len(deep) else 1.0)
+    share = np.minimum(share, max(1.0, float(np.median(deep))) if len(deep) else 1.0)
+    grey.reshape(-1)[inner] = share
     ways = [way for way in WAYS if np.linalg.norm(way * spacing) <= LONGEST * STEP * voxel]
     least = max(DARKER, SIGMAS * levels.noise_after(taps) / levels.contrast)
+    inner = np.asarray(inner[share.max() - share > least])  # nothing beside the others is so much brighter
     dark = inner[np.concatenate(in_parts(partial(_darker, grey, ways), inner)) > least]
     if not len(dark):
         return dark

@@ -210,7 +210,7 @@ def _on_box(reference: Volume, region: SearchRegion, axes: tuple[int, int, int])
 
 
 def _interpolated(scan: Grid, region: SearchRegion) -> NDArray[np.float32]:
-    """A scan's grey on the region's box, at its runs alone; 0 beyond the scan.
+    """A scan's grey on the region's box, at its runs alone; beyond the scan that at its edge.
 
     By cubic splines: halfway between voxels trilinear grey is off by 5 % of the contrast at a wall blurred by 0.7
     voxel, which was a mark as bright as a thin wire. Splines leave 2 %.
@@ -219,7 +219,7 @@ def _interpolated(scan: Grid, region: SearchRegion) -> NDArray[np.float32]:
     splines = ndimage.spline_filter(scan.values, output=np.float32)
     out = sparse_zeros(region.box.shape, np.float32)
     index = scan.to_index(region.box.to_mm(at)).T
-    out[tuple(at.T)] = ndimage.map_coordinates(splines, index, np.float32, mode="constant", prefilter=False)
+    out[tuple(at.T)] = ndimage.map_coordinates(splines, index, np.float32, mode="nearest", prefilter=False)
     return out
 
 
