@@ -24,7 +24,7 @@ from pipeline.trace.attempt import EntryPose, _fitted, dense, misfit, prolonged
 from pipeline.trace.config import TraceConfig
 from pipeline.trace.elsewhere import DARK, brightest_line, hint_of_lines, passed_by_dark
 from pipeline.trace.knots import first_tube
-from pipeline.trace.region import _regions
+from pipeline.trace.region import _regions, shows_lumen
 from pipeline.trace.rotation_plane import near_rotation_plane
 from pipeline.trace.subtraction import BLOCK, _smooth, levelled, subtracted, subtracting
 from pipeline.trace.tube import fit_tube
@@ -80,6 +80,13 @@ def test_what_is_measured_is_never_summed():
     for stage in (curve, lumen):
         assert not set(stage.counters) & set(stage.levels)
         assert not [name for name in stage.counters if "cnr" in name or "blur" in name or "fraction" in name]
+
+
+def test_a_scan_beside_the_lumen_shows_none_of_it():
+    """The corner of the lumen's lattice stood for it: inside a lumen that goes on beyond its lattice."""
+    lumen = Lumen(Grid(np.full((4, 4, 4), -1.0, np.float32)))
+    assert shows_lumen(Volume(np.zeros((4, 4, 4), np.float32)), lumen)
+    assert not shows_lumen(Volume(np.zeros((4, 4, 4), np.float32), origin_mm=[9.0, 0.0, 0.0]), lumen)
 
 
 @pytest.mark.parametrize("has_reference", [True, False])
