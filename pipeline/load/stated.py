@@ -36,7 +36,7 @@ _STATES = {
     of: re.compile(pattern, re.IGNORECASE)
     for of, pattern in {"RAS": r"(?!)", "voxels": rf"{_MM}|(?<![a-z])lps(?![a-z])", "a unit": _MM}.items()
 }
-"""What says that a line that speaks of it is of mm none the less, as "in mm (LPS), resampled from ijk"; nothing of RAS."""
+"""What says that a line is of mm, whatever else it speaks of: "in mm (LPS), resampled from ijk". None for RAS."""
 
 
 def stated_in(path: Path, kind: str) -> tuple[str, str]:
