@@ -224,7 +224,8 @@ class Curve:
     marks_mm : (k, 3) points as bright as the wire in the lumen beyond the curve's end.
     brightness : (n,) the line's grey above its background, summed across it, grey mm2; contrast : grey of the scan in
     the lumen above that around it. Empty and NaN where no scan was traced.
-    doubts : the first is its status and note; those that no other frame settles come before the others.
+    doubts : reasons not to trust it. The curve's status and note are those of the first. Doubts that another frame may
+    settle come last.
     source : the file of a curve that was given.
     """
 
@@ -272,7 +273,12 @@ class Curve:
         return replace(self, doubts=tuple(doubts))
 
     def without(self, of: str) -> "Curve":
-        """The same curve without its doubt of this level: what else is doubted remains."""
+        """The same curve without its doubt of this level: what else is doubted remains.
+
+        ValueError for an empty name: doubts without one are those that no other frame settles.
+        """
+        if not of:
+            raise ValueError("of: got an empty name; expected the level whose doubt is settled")
         return replace(self, doubts=tuple(doubt for doubt in self.doubts if doubt.of != of))
 
     def reworded(self, words: Callable[[str], str]) -> "Curve":

@@ -82,5 +82,5 @@ def held_in(folder: Path) -> str:
         return f"It has sub-folders: {', '.join(below[:5])}; name one of them, as in {folder.name}/{below[0]}.\n"
     if not scans:
         return ""
-    end = next(end for end in OWN if scans[0].lower().endswith(end))
+    end = next(scans[0][-len(end) :] for end in OWN if scans[0].lower().endswith(end))
     return f"It holds scans, as {scans[0]}; name these, as in {folder.name}/*{end}.\n"

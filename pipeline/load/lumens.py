@@ -31,7 +31,8 @@ def meant_within_mm(voxel_mm: float, entry_sigma_mm: float | None) -> float:
 
 
 def read_swc(path: Path) -> Branches:
-    """A .swc tree: number, type, x, y, z, radius, parent (-1 = root), LPS mm unless a comment states another."""
+    """A .swc tree: number, type, x, y, z, radius, parent (-1, or 0 where no node is 0: a root), LPS mm unless a comment
+    states another."""
     lines = read_text(path).splitlines()
     rows = [line.encode().split() for line in lines if line.strip() and not line.lstrip().startswith("#")]
     try:
@@ -59,7 +60,7 @@ def _parents(path: Path, node: Array, parent: Array) -> tuple[NDArray[np.int64],
     if np.any(counts > 1):
         raise refused(path, f"node {known[counts > 1][0]:g} twice", "a number of its own for each", "number them anew")
     held = np.isin(parent, node)
-    lost = ~held & (parent != -1)
+    lost = ~held & (parent != -1) & (parent != 0)  # some count nodes from 1, and a root's parent is 0
     if np.any(lost):
         got = f"node {node[lost][0]:g} with the parent {parent[lost][0]:g}, which is none of the nodes"
         raise refused(path, got, "a node's number, or -1 for a root", "export the whole tree again")

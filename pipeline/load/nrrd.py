@@ -103,15 +103,17 @@ def _fields(path: Path) -> tuple[dict[str, str], int]:
     end = blank.end() if blank else len(start)
     fields: dict[str, str] = {}
     text = start[:end].decode("utf-8", errors="replace")
-    for line in text.splitlines()[1:]:
+    lines = text.splitlines()
+    for n, line in enumerate(lines[1:], 2):
         name, colon, value = line.partition(":")
         if colon and not line.startswith("#"):
             key = name if value.startswith("=") else ALIAS.get(name.strip().lower(), name.strip().lower())
             value = value.removeprefix("=").strip()
             if fields.setdefault(key, value) != value:
                 raise said_twice(path, f"{key}: {fields[key][:40]}", f"{key}: {value[:40]}")
-    if fields.get("data file", "").upper().split()[:1] == ["LIST"]:
-        fields["data file"] += "\n" + text.partition(fields["data file"])[2]
+            if key == "data file" and value.upper().split()[:1] == ["LIST"]:  # the header's last field: names follow
+                fields[key] = "\n".join((value, *lines[n:]))
+                break
     return fields, end
 
 

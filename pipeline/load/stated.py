@@ -19,16 +19,24 @@ _SPACE_OF = re.compile(
     re.IGNORECASE,
 )
 """Any word that is given as the space: SPACE knows some."""
-_OTHER_UNITS = "|".join(name for name, mm in UNITS_MM.items() if mm != 1.0 and name != "in")
+_OTHER_UNITS = "|".join(name for name, mm in UNITS_MM.items() if mm != 1.0 and name not in ("in", "m"))
+_ENDS = r"(?=[\s,;:()\[\]]|\.?\s*$)"
 _SPEAKS = {
     of: re.compile(rf"(?<![a-z])(?:{pattern})", re.IGNORECASE)
     for of, pattern in {
         "RAS": r"ras(?![a-z])|right[ _-]*anterior",
-        "voxels": r"in[ \t]+(?:vox|pix)els?(?![a-z])|(?:vox|pix)els?[ _-]*(?:ind|coord|space|unit)|ijk(?![a-z])",
-        "a unit": rf"(?:in|is|are)[ \t]+(?:{_OTHER_UNITS})(?![a-zµμ])",
+        "voxels": r"in[ \t]+(?:vox|pix)els(?![a-z])|(?:vox|pix)els?[ _-]*(?:ind|coord|unit)|ijk(?![a-z])"
+        r"|(?<!smoothed in )(?<!filtered in )(?:vox|pix)els?[ _-]*space",
+        "a unit": rf"(?:in[ \t]+m|(?:in|is|are)[ \t]+(?:{_OTHER_UNITS})){_ENDS}",
     }.items()
 }
-"""What a line may speak of without stating it."""
+"""What a line may speak of without stating it. "is m1" and "is m. cerebri media" name arteries."""
+_MM = r"(?<!radius )(?<!radii )(?<![a-z])(?:in|is|are)[ \t]+(?:mm|millimet(?:er|re)s?)(?![a-z])"
+_STATES = {
+    of: re.compile(pattern, re.IGNORECASE)
+    for of, pattern in {"RAS": r"(?!)", "voxels": rf"{_MM}|(?<![a-z])lps(?![a-z])", "a unit": _MM}.items()
+}
+"""What says that a line is of mm, whatever else it speaks of: "in mm (LPS), resampled from ijk". None for RAS."""
 
 
 def stated_in(path: Path, kind: str) -> tuple[str, str]:
@@ -67,8 +75,9 @@ def stated_in_table(path: Path, rows: Sequence[Sequence[str]], comments: Sequenc
 
 
 def _spoken(of: str, lines: Sequence[str]) -> str:
-    """The first line that speaks of something; empty where none does."""
-    return next((line.strip()[:60] for line in lines if _SPEAKS[of].search(line)), "")
+    """The first line that speaks of something, and does not say that it is mm; empty where none does."""
+    found = (line for line in lines if _SPEAKS[of].search(line) and not _STATES[of].search(line))
+    return next((line.strip()[:60] for line in found), "")
 
 
 def _taken(stated: str, usual: str) -> str:

@@ -16,15 +16,15 @@ from pipeline.register.shift import farthest, look
 from reports.case_files import frames_named
 
 DRIFT = "drift_voxels"
-"""Level of a curve in whose scan the phantom lies elsewhere than in the one it is held against: voxels at most."""
+"""Level of a curve in whose scan the phantom lies elsewhere than in the earlier one: voxels at most."""
 MOVED_VOXELS = 0.5
 """Motion from which that is said. In 20 frames of a phantom that lay still it is 0.03 at most, whatever their wires."""
 
 
-class Since(NamedTuple):
-    """The scan that frames are held against, in words: its name, why nothing is registered to it, and what to do."""
+class EarlierScan(NamedTuple):
+    """The scan that frames are compared with, in words: its name, why nothing is registered to it, and what to do."""
 
-    scan: str
+    name: str
     why: str
     do: str
 
@@ -32,60 +32,60 @@ class Since(NamedTuple):
     def perhaps(self) -> str:
         """What is added to the reason for which a frame is refused whose motion is not seen."""
         return (
-            f"; a phantom that moved since {self.scan} looks like this, too, and its motion is not seen here: {self.do}"
+            f"; a phantom that moved since {self.name} looks like this, too, and its motion is not seen here: {self.do}"
         )
 
 
-FIRST = Since(
+FIRST = EarlierScan(
     "frame 0",
     "without a reference scan nothing is registered",
     "give a scan without wire (reference), to which frames are registered, or register the scans before",
 )
-REFERENCE = Since(
+REFERENCE = EarlierScan(
     "the reference scan",
     "with trace.register = off nothing is registered",
     "leave trace.register at auto, or register the scans before",
 )
 
 
-def with_drift(curve: Curve, frame: Volume, still: Anchor | None, since: Since = FIRST) -> Curve:
+def with_drift(curve: Curve, frame: Volume, structures: Anchor | None, earlier: EarlierScan = FIRST) -> Curve:
     """The curve, with DRIFT among its levels where the phantom moved; why it was refused then, or may have been.
 
-    frame : its scan.  still : of the scan that frames are held against, ``since`` in words; None where there is none.
+    frame : its scan.  structures : what the earlier scan shows of the phantom; None where there is no such scan.
     """
-    if still is None or len(still.wall.points_mm) < WALL_POINTS:
+    if structures is None or len(structures.wall.points_mm) < WALL_POINTS:
         return curve
-    voxels = _since(frame, still, doubted=bool(curve.doubts))
+    voxels = _moved_voxels(frame, structures, doubted=bool(curve.doubts))
     if np.isnan(voxels):
-        return curve.reworded(lambda note: note + since.perhaps)
+        return curve.reworded(lambda note: note + earlier.perhaps)
     if voxels < MOVED_VOXELS:
         return curve
-    why = f"trace: phantom: got a motion of {voxels:.1f} voxels since {since.scan}; expected {MOVED_VOXELS:g} at most, "
-    why += f"as {since.why}; {since.do} (what follows from it: "
+    why = f"trace: phantom: got a motion of {voxels:.1f} voxels since {earlier.name}; expected {MOVED_VOXELS:g} at most"
+    why += f", as {earlier.why}; {earlier.do} (what follows from it: "
     curve = curve.reworded(lambda note: f"{why}{note})")
     return replace(curve, levels={**curve.levels, DRIFT: voxels})
 
 
-def _since(frame: Volume, still: Anchor, *, doubted: bool) -> float:
+def _moved_voxels(frame: Volume, structures: Anchor, *, doubted: bool) -> float:
     """How far (voxels) the phantom moved at most; NaN where the scan does not show it.
 
     doubted : it is looked for far and wide, which takes a second, where it is not found near.
     """
-    near, _ = look(frame, still.wall, Motion(), MOVED_VOXELS)
-    moved, fits = farthest(near.motion, still.wall), near.misfit_voxels < BAD_MISFIT_VOXELS
+    near, _ = look(frame, structures.wall, Motion(), MOVED_VOXELS)
+    moved, fits = farthest(near.motion, structures.wall), near.misfit_voxels < BAD_MISFIT_VOXELS
     if not doubted or (fits and moved < MOVED_VOXELS):
         return moved if fits else float("nan")
-    found = register(frame, still, MOVED_VOXELS)
+    found = register(frame, structures, MOVED_VOXELS)
     return found.moved_voxels if found.trusted else float("nan")
 
 
-def of_drift(curves: Mapping[int, Curve], since: Since = FIRST) -> list[str]:
-    """A warning where the phantom moved. curves : of each frame, by its number, held against a scan, in words."""
+def of_drift(curves: Mapping[int, Curve], earlier: EarlierScan = FIRST) -> list[str]:
+    """A warning where the phantom moved. curves : of each frame, by its number.  earlier : what it is compared with."""
     moved = {n: curve.levels[DRIFT] for n, curve in curves.items() if DRIFT in curve.levels}
     if not moved:
         return []
     worst = max(moved, key=lambda n: moved[n])
     return [
-        f"{frames_named([*moved])}: the phantom moved since {since.scan}, by {moved[worst]:.1f} voxels (frame {worst}),"
-        f" and {since.why}: lumen and entry are those of {since.scan}, traces lie off by as much; {since.do}"
+        f"{frames_named([*moved])}: the phantom moved since {earlier.name}, by {moved[worst]:.1f} voxels (frame {worst}"
+        f"), and {earlier.why}: lumen and entry are those of {earlier.name}, traces lie off by as much; {earlier.do}"
     ]

@@ -99,12 +99,11 @@ def _best_along(frame: Volume, s: StaticPoints, motion: Motion, axis: Array) -> 
     best = int(np.argmin(square.mean(axis=1)))
     worse = square - square[best]  # point by point, as all places have the same noise
     sure = worse.mean(axis=1) / np.maximum(worse.std(axis=1) * np.sqrt(TOGETHER / max(1, worse.shape[1])), 1e-12)
-    loose = max(farthest(motions[k].after(motions[best]), s) for k in np.flatnonzero(sure < SURE))
     n = int(np.clip(best, 1, len(rest) - 2))
     a, b, _ = np.polyfit(OFFSETS_VOXELS[n - 1 : n + 2], square.mean(axis=1)[n - 1 : n + 2], 2)
-    if not a > 0.0 or sure[here] < SURE or worse[here].mean() < LEAST_GAIN * square[here].mean():
-        return motion, loose
-    return settled(float(np.clip(-b / (2.0 * a), *OFFSETS_VOXELS[[n - 1, n + 1]]))), loose
+    if a > 0.0 and sure[here] >= SURE and worse[here].mean() >= LEAST_GAIN * square[here].mean():
+        motion = settled(float(np.clip(-b / (2.0 * a), *OFFSETS_VOXELS[[n - 1, n + 1]])))
+    return motion, max(farthest(motions[k].after(motion), s) for k in np.flatnonzero(sure < SURE))
 
 
 def _rest(frame: Volume, s: StaticPoints, motion: Motion, seen: NDArray[np.bool_]) -> Array:

@@ -17,6 +17,9 @@ LEAST_SPREADS, LEAST_MM = 5.0, 4.0
 noises has a height of 5.7 to 8.1, the same vessel without wire 3.2."""
 BESIDE_MM = 1.0
 """Distance from the line beyond which the entry is not on it: a clamp may lie as far from the manifest's entry."""
+DARKER = 1.5
+"""Height of a dark line over that of the brightest line near it, from which it is told: where the phantom moved both
+are alike, and beside a wire of 800 grey a streak of 100 was."""
 DARK = (
     "a dark line passes entry_mm: if that is the wire, it is darker than the contrast medium, in which only brighter "
     "ones are traced: scan with thinner medium, or without"
@@ -24,10 +27,11 @@ DARK = (
 
 
 class Line(NamedTuple):
-    """A bright line: how near it comes to the entry, mm, and its point nearest to it, (3,) LPS mm."""
+    """A bright line: how near it comes to the entry, mm; its point nearest to it, (3,) LPS mm; its height, grey/mm2."""
 
     distance_mm: float
     nearest_mm: Array
+    height: float
 
     def __str__(self) -> str:
         """A hint for the user on where the entry belongs."""
@@ -52,10 +56,16 @@ def brightest_line(frame: Volume, reference: Volume | None, entry_mm: Array) -> 
 
 
 def passed_by_dark(frame: Volume, reference: Volume | None, entry_mm: Array) -> bool:
-    """Whether the darkest line near the entry passes it: a wire, or its coat, that is darker than the medium."""
+    """Whether the darkest line near the entry passes it, and no bright one is as strong.
+
+    A wire, or its coat, that is darker than the medium.
+    """
     grey, box = _around(frame, reference, entry_mm)
-    line = _nearest(-grey, box, entry_mm)
-    return line is not None and line.distance_mm <= BESIDE_MM
+    dark = _nearest(-grey, box, entry_mm)
+    if dark is None or dark.distance_mm > BESIDE_MM:
+        return False
+    bright = _nearest(grey, box, entry_mm)
+    return bright is None or dark.height > DARKER * bright.height
 
 
 def _around(frame: Volume, reference: Volume | None, entry_mm: Array) -> tuple[NDArray[np.float32], Grid]:
@@ -73,12 +83,15 @@ def _around(frame: Volume, reference: Volume | None, entry_mm: Array) -> tuple[N
 def _nearest(grey: NDArray[np.float32], box: Grid, entry_mm: Array) -> Line | None:
     """The point of the brightest line that is nearest to the entry; None without one."""
     spacing = np.asarray(box.spacing_mm, float)
-    if min(grey.shape) < 3 or not len(line := _strongest(_of_lines(grey, spacing), spacing)):
+    if min(grey.shape) < 3:
+        return None
+    strength = _of_lines(grey, spacing)
+    if not len(line := _strongest(strength, spacing)):
         return None
     points = box.to_mm(line)
     away = np.linalg.norm(points - entry_mm, axis=1)
     nearest = int(np.argmin(away))
-    return Line(float(away[nearest]), points[nearest])
+    return Line(float(away[nearest]), points[nearest], float(strength.max()))
 
 
 def _of_lines(grey: NDArray[np.float32], spacing: Array) -> Array:

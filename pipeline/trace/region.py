@@ -125,8 +125,8 @@ def _onto(frame: Grid, distance: Grid) -> tuple[Grid, NDArray[np.int64]]:
     if corner is not None:
         low = np.maximum(corner, 0)
         high = np.minimum(corner + distance.shape, frame.shape)
-        if np.any(high <= low):
-            return distance.crop((0, 0, 0), (1, 1, 1)), low
+        if np.any(high <= low):  # no voxel in common: one that is outside the lumen
+            return distance.crop((0, 0, 0), (1, 1, 1)).with_values(np.full((1, 1, 1), np.inf, np.float32)), low
         a, b = (low - corner).tolist(), (high - corner).tolist()
         return distance.crop((a[0], a[1], a[2]), (b[0], b[1], b[2])), low
     index = frame.to_index(corners_mm(distance))

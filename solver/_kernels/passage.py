@@ -28,8 +28,8 @@ def note_passage(problem: Problem, at: Any, k: int, depth: float, segment: float
 def passage(problem: Problem, k: int, was: int, segment: float) -> float:
     """Length of wire beyond the hind one of two strands that passed through each other in a step, mm; 0 where none did.
 
-    Two strands can only meet where the wire between them turns by half a circle: of a wire that turns less no pair is
-    looked at, of another one only those that far apart along it, and as far on as they lie apart in space.
+    Two strands can only meet where the wire between them turns by half a circle: segments between which it turns less
+    are skipped. So are those too far apart in space for the step to bring them together.
     """
     x, r, common = problem.state.x, problem.state.r[CURRENT], min(k, was)
     reach = -1.0

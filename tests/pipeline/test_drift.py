@@ -108,5 +108,5 @@ def test_a_phantom_that_moved_is_told_where_registration_is_switched_off(tmp_pat
     result = json.loads((tmp_path / "out/cases/c/result.json").read_text(encoding="utf-8"))
     (said,) = (text for text in result["warnings"] if "the phantom moved since" in text)
     assert said.startswith(
-        f"frame 0: the phantom moved since {REFERENCE.scan}, by 1.0 voxels (frame 0), and with trace"
+        f"frame 0: the phantom moved since {REFERENCE.name}, by 1.0 voxels (frame 0), and with trace"
     )

@@ -103,6 +103,12 @@ def test_a_gap_that_may_be_before_another_device_stays_refused(lengths, beyond):
     assert not any(f.ok for f in found)
 
 
+def test_a_refusal_is_no_doubt_that_frames_can_settle():
+    """It has no level: the empty name stood for all of them."""
+    with pytest.raises(ValueError, match="of: got an empty name"):
+        Curve(np.eye(3), np.zeros(3)).doubted(FrameStatus.TRACE_AMBIGUOUS, "two wires").without("")
+
+
 def test_a_copy_of_a_frame_is_no_third_with_the_same_gap():
     seen = gapped([40.0, 46.0, 40.0], [20.0] * 3)
     found = once([replace(f, voxels=v) for f, v in zip(seen, "aba", strict=True)])

@@ -57,6 +57,7 @@ PLANES = ["s 1.raw", "s 2.raw"]
         ("a.nhdr", f"{NRRD} data file: v.raw\n\n", ["v.raw"]),
         ("a.nhdr", f"{NRRD}datafile: v.raw\n\n", ["v.raw"]),
         ("a.nhdr", f"{NRRD}data file: LIST\ns 1.raw\ns 2.raw\n", PLANES),
+        ("a.nhdr", f"{NRRD}# a LIST\ndata file: LIST\ns 1.raw\ns 2.raw\n", PLANES),
         ("a.nhdr", f"{NRRD}data file: listed.raw\n\n", ["listed.raw"]),
     ],
 )

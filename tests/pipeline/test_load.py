@@ -378,6 +378,10 @@ def test_what_is_not_there_or_no_scan_is_said(tmp_path: Path) -> None:
         LoadError, match=r"expected one\.\n  It has sub-folders: series; name one .* as in below/series"
     ):
         read_header(tmp_path / "below")
+    (tmp_path / "capitals").mkdir()
+    (tmp_path / "capitals" / "A.NII").write_bytes(bytes(400))
+    with pytest.raises(LoadError, match=r"It holds scans, as A\.NII; name these, as in capitals/\*\.NII"):
+        read_header(tmp_path / "capitals")
 
 
 def test_a_file_cut_short_is_said(tmp_path: Path) -> None:

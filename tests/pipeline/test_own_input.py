@@ -369,6 +369,17 @@ def test_what_speaks_of_ras_and_does_not_state_it_is_refused(tmp_path: Path, lin
         ("# voxel indices", "a line that speaks of voxels"),
         ("# counted in voxels", "a line that speaks of voxels"),
         ("# voxel size 0.4 mm", ""),
+        ("# points in pixel space", "a line that speaks of voxels"),
+        ("# in voxels of 0.3 mm", "a line that speaks of voxels"),
+        ("# in voxels, radius in mm", "a line that speaks of voxels"),
+        ("# lengths are in m.", "a line speaks of a unit"),
+        ("# lengths are in \u00b5m", "a line speaks of a unit"),
+        ("# coordinates in mm (LPS), resampled from ijk", ""),
+        ("# LPS, from voxel indices", ""),
+        ("# created in voxel mode", ""),
+        ("# smoothed in pixel space before export", ""),
+        ("# root is m1", ""),
+        ("# the artery is m. cerebri media, in mm", ""),
     ],
 )
 def test_a_table_without_units_that_speaks_of_some_is_refused(tmp_path: Path, line: str, said: str) -> None:
@@ -390,6 +401,14 @@ def test_a_tree_says_its_space_and_unit(tmp_path: Path, comment: str, factors: A
     assert isinstance(lumen, Branches)
     found = [*lumen.start_mm[0], lumen.start_radius_mm[0]], [*lumen.end_mm[0], lumen.end_radius_mm[0]]
     np.testing.assert_allclose(found, np.array([[1, 2, 3, 0.5], [4, 5, 6, 0.4]]) * factors)
+
+
+def test_a_root_whose_parent_is_0_is_a_root(tmp_path: Path) -> None:
+    """Where nodes are counted from 1; it was refused as a node that is missing."""
+    (tmp_path / "a.swc").write_text("1 2 0 0 0 1 0\n2 2 0 0 9 1 1\n", encoding="utf-8")
+    lumen = read_lumen(tmp_path / "a.swc", 1)
+    assert isinstance(lumen, Branches)
+    np.testing.assert_allclose([lumen.start_mm[0], lumen.end_mm[0]], [[0, 0, 0], [0, 0, 9]])
 
 
 @pytest.mark.parametrize(("stated", "of_radii", "factor"), [("cm", "cm", 10), ("cm", "", 10), ("mm", "cm", 1)])

@@ -238,9 +238,12 @@ def test_a_vessel_that_slid_along_itself_is_found_or_said_to_be_loose(seed: int)
     assert ("along, or about, itself" in found.sentence) == (found.loose_mm > 0.5)
 
 
-@pytest.mark.parametrize(("waves_voxels", "least", "most"), [(0.0, 6.0, 12.0), (5.0, 0.0, 0.1)])
+@pytest.mark.parametrize(("waves_voxels", "least", "most"), [(0.0, 5.9, 6.1), (5.0, 0.0, 0.1)])
 def test_a_place_that_slides_back_is_no_other_place(waves_voxels: float, least: float, most: float) -> None:
-    """Places were told from where they started: curved vessels that lay right to 0.02 voxel, as 1 to 5 mm off."""
+    """Places were told from where they started: curved vessels that lay right to 0.02 voxel, as 1 to 5 mm off.
+
+    And from the best place, where another one was kept: a straight tube as 9 to 12 voxels off, of 6 that were tried.
+    """
     x, y, z = np.indices((40, 36, 80), np.float32)
     off = np.hypot(x - 19.5 - waves_voxels * np.sin(z / 9.0), y - 17.5 - 0.6 * waves_voxels * np.cos(z / 11.0)) - 5.0
     rng = np.random.default_rng(0)

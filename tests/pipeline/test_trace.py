@@ -22,9 +22,9 @@ from pipeline.status import FrameStatus
 from pipeline.trace import doubts, explain, of_catheter, of_length, trace
 from pipeline.trace.attempt import EntryPose, _fitted, dense, misfit, prolonged
 from pipeline.trace.config import TraceConfig
-from pipeline.trace.elsewhere import DARK, brightest_line, passed_by_dark
+from pipeline.trace.elsewhere import DARK, brightest_line, hint_of_lines, passed_by_dark
 from pipeline.trace.knots import first_tube
-from pipeline.trace.region import _regions
+from pipeline.trace.region import _regions, shows_lumen
 from pipeline.trace.rotation_plane import near_rotation_plane
 from pipeline.trace.subtraction import BLOCK, _smooth, levelled, subtracted, subtracting
 from pipeline.trace.tube import fit_tube
@@ -82,6 +82,13 @@ def test_what_is_measured_is_never_summed():
         assert not [name for name in stage.counters if "cnr" in name or "blur" in name or "fraction" in name]
 
 
+def test_a_scan_beside_the_lumen_shows_none_of_it():
+    """The corner of the lumen's lattice stood for it: inside a lumen that goes on beyond its lattice."""
+    lumen = Lumen(Grid(np.full((4, 4, 4), -1.0, np.float32)))
+    assert shows_lumen(Volume(np.zeros((4, 4, 4), np.float32)), lumen)
+    assert not shows_lumen(Volume(np.zeros((4, 4, 4), np.float32), origin_mm=[9.0, 0.0, 0.0]), lumen)
+
+
 @pytest.mark.parametrize("has_reference", [True, False])
 def test_a_wrong_entry_is_told_where_the_brightest_line_is(has_reference):
     """It was told to check that the frame shows a wire, which it did: 6 mm beside the entry."""
@@ -108,6 +115,28 @@ def test_a_wire_that_is_darker_than_the_medium_is_called_dark():
     assert curve.note.endswith(DARK)
     assert not passed_by_dark(frame, reference, entry)
     assert not passed_by_dark(reference, None, entry)
+
+
+def vessel_with(radius: float, moved_mm: float = 0.0, lines: tuple[tuple[float, float], ...] = ()) -> Volume:
+    """A vessel of 500 along z with lines in it, each by its x, mm, and grey; the entry is [0, 0, 5]."""
+    spacing, x, y = 0.3, *(0.3 * (np.indices((60, 60)) - 30))
+    grey = 500.0 * ndtr((radius - np.hypot(x - moved_mm, y)) / 0.3)
+    for at, height in lines:
+        grey = grey + height * np.exp(-0.5 * ((x - at) ** 2 + y**2) / spacing**2)
+    noise = np.random.default_rng(0).normal(0.0, 15.0, (60, 60, 60))
+    return Volume((grey[..., None] + noise).astype(np.float32), [spacing] * 3, [-9.0, -9.0, 0.0])
+
+
+def test_a_dark_streak_at_the_entry_is_not_told_before_a_bright_wire_beside_it():
+    """A wire of 800 grey 1.8 mm off: of a streak of 100 it was said that it is the wire, and to thin the medium."""
+    frame = vessel_with(4.0, lines=((1.8, 800.0), (0.0, -100.0)))
+    said = hint_of_lines(frame, vessel_with(4.0), np.array([0.0, 0.0, 5.0]))
+    assert "the brightest line near it passes 1.8 mm from entry_mm" in said
+
+
+def test_a_vessel_that_moved_is_not_called_a_dark_line():
+    """By a voxel, without any wire: less the reference it is a bright and a dark line, alike."""
+    assert DARK not in hint_of_lines(vessel_with(0.8, 0.3), vessel_with(0.8), np.array([0.0, 0.0, 5.0]))
 
 
 @pytest.mark.parametrize(("cnr", "mean_bar", "tip_bar"), [(16, 0.05, 0.4), (8, 0.08, 0.7), (4, 0.15, 1.1)])

@@ -17,6 +17,7 @@ from solver import Grid, GuideWire, Insertion, Insertions, VesselWall
 from solver.self_contact import self_overlap_mm
 from tests.naive.passes import closest_mm
 from tests.naive.writhe import writhe
+from tests.solver.scenes import tube_grid
 
 RADIUS = 0.18
 
@@ -106,6 +107,16 @@ def test_a_wire_that_passed_through_itself_between_two_depths_says_so_from_there
         still, out = twin.to_depths([48.0, 5.0], 160.0)
         assert still.passed_itself_mm <= after.passed_itself_mm, "both strands are in the sac still"
         assert math.isinf(out.passed_itself_mm), "the hind strand is out"
+
+
+def test_a_helix_that_slides_along_a_tube_does_not_pass_through_itself() -> None:
+    """Its strands turn over each other, three turns in 50 mm, and stay 5 mm apart."""
+    wire = GuideWire(0.5, RADIUS, 2.0, 0.4, torsional_stiffness_N_mm2=1.0)
+    helix = Insertion(wire, VesselWall(tube_grid(0.5, 1.5), 20.0), [0, 0, 0], [0, 0, 1])
+    short, whole, back = helix.to_depths([30.0, 50.0, 20.0])
+    along = np.diff(whole.joints_mm, axis=0) / wire.segment_mm
+    assert np.linalg.norm(np.diff(along, axis=0), axis=1).sum() > 6.0 * math.pi
+    assert all(math.isinf(found.passed_itself_mm) for found in (short, whole, back))
 
 
 def test_wires_side_by_side_note_it_too() -> None:

@@ -15,7 +15,7 @@ LEAST_SHARE = 0.9
 catalogue (the fit is wider than a blurred disc); with twice the radius stated it is 0.57 to 1.05: 15 of them are
 noticed."""
 DIAMETER_SHARE = 0.8
-"""The same below which the radius may be a diameter: of 0.18 mm in a lumen whose wall looked blunt it was 0.89."""
+"""The same below which a diameter is the likely cause; else it is named second: a right radius of 0.18 mm had 0.89."""
 LEAST_VOXELS = 1.2
 """Least stated diameter, voxels, whose blur differs from a thin line's: at 0.84 voxels the ratio was 1.0."""
 MOST_SHARE, MORE_VOXELS = 2.5, 0.75
@@ -40,9 +40,8 @@ def too_thin(frames: Sequence[Frame], lumen: Lumen, radius_mm: float) -> list[st
     if seen < DIAMETER_SHARE * radius_mm:
         doubt = "is it the diameter? wall contact and stiffness hang on it"
     else:
-        doubt = (
-            f"{100.0 * (1.0 - seen / radius_mm):.0f} % less; check it, or the lumen, whose wall tells the scan's blur"
-        )
+        less = f"{100.0 * (1.0 - seen / radius_mm):.0f} % less"
+        doubt = f"{less}; check the lumen, whose wall tells the scan's blur, and whether it is the diameter"
     return [
         f"the traced wire looks {2.0 * seen:.2f} mm thick at most, and radius_mm = {radius_mm:g} says "
         f"{2.0 * radius_mm:g} mm: {doubt}"

@@ -12,7 +12,7 @@ from pipeline.arrays.grids import corners_mm
 from pipeline.load import Crop, Header
 from pipeline.model import Curve, Lumen, Volume
 from pipeline.register import Anchor, Motion, anchor
-from pipeline.register.drift import FIRST, REFERENCE, Since, of_drift, with_drift
+from pipeline.register.drift import FIRST, REFERENCE, EarlierScan, of_drift, with_drift
 from pipeline.register.frames import Alignment, alignment_of, counters_of, put_in_place, sentences_of, widened
 from pipeline.run.helpers import Earlier
 from pipeline.run.log import Log
@@ -83,7 +83,9 @@ def trace_frames(run: Context, known: Known) -> Known:
     run.log.warnings += _in_plane(frames, run.config.trace)
     assumed, doubtful = sentences_of(work.alignment, {frame.index: frame.registration for frame in frames})
     run.log.assumptions += assumed
-    run.log.warnings += doubtful + of_drift({f.index: f.curve for f in frames if f.curve is not None}, work.since)
+    run.log.warnings += doubtful + of_drift(
+        {f.index: f.curve for f in frames if f.curve is not None}, work.earlier_scan
+    )
     frames = [_first_said(frame, known.lumen_doubt) for frame in frames]
     return _with_room(run, replace(known, off_the_scans=bool(off_scans)), frames, elsewhere)
 
@@ -162,13 +164,13 @@ class _Tracing:
         return wire_in_reference(self.run, self.reference, self.lumen)
 
     @property
-    def since(self) -> Since:
+    def earlier_scan(self) -> EarlierScan:
         """The scan that shows whether the phantom moved, in words."""
         return FIRST if self.reference is None else REFERENCE
 
     @cached_property
-    def still(self) -> Anchor | None:
-        """What tells whether the phantom moved since the reference, or the first frame; None where nobody asks.
+    def structures(self) -> Anchor | None:
+        """What the reference, or else the first frame, shows of the phantom; None where nobody asks whether it moved.
 
         No file is counted as read once more for it.
         """
@@ -215,7 +217,7 @@ class _Tracing:
         seen = widened(self.follow(run, frame, here, earlier), registration)
         if frame.index or self.reference is not None:
             with log.timed("trace", frame.index):
-                seen = with_drift(seen, volume, self.still, self.since)
+                seen = with_drift(seen, volume, self.structures, self.earlier_scan)
         done = _of_scan(run, frame, seen, self.lumen)
         if self.given:
             done = as_given(run, frame, self.given[frame.index], self.lumen.distance)
