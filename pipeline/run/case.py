@@ -82,7 +82,7 @@ def clear(folder: Path) -> str:
         folder.mkdir(parents=True, exist_ok=True)
     known = ledger.read(folder)
     kept = [name for part in (ledger.VIEW, ledger.FIGURES) for name in ledger.remove(folder / part, known)]
-    for name in (ledger.FILE, *ledger.DATA, *ledger.PAGES):
+    for name in ledger.TOP:
         with writing(folder / name):
             (folder / name).unlink(missing_ok=True)
     with writing(folder):

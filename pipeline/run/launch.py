@@ -18,6 +18,7 @@ from pipeline.run.cache import Store, forget_lumen
 from pipeline.run.case import Job, clear, each_on, finished, run_case
 from pipeline.run.earlier import remove_arrays, remove_others, remove_over_all, remove_records
 from pipeline.run.gate import Gate
+from pipeline.run.guards import guard_own
 from pipeline.run.hashing import file_hash
 from pipeline.run.inputs import stated
 from pipeline.run.log import last_stage
@@ -38,7 +39,7 @@ from reports.atomic import WriteError, remove_leftovers, write_text, writing
 from reports.case_files import counted, provenance_of
 from reports.doubts import AMONG
 from reports.gates import GATES
-from reports.records import read_json, run_records
+from reports.records import read_json
 from reports.run_page import render_index
 from reports.schema import FAILURES, OVERALL_FILE, SUMMARY, SWEEP, TIMINGS
 from reports.sweep import not_run
@@ -170,13 +171,14 @@ def launch(plan: Plan) -> tuple[Totals, Path]:
     info |= {"fail_if": [gate.text for gate in plan.gates], **({"own": own} if (own := registered()) else {})}
     name = f"run.{plan.shard.replace('/', '-')}.json" if plan.shard else "run.json"
     info |= {"left_out": _never_asked(out / name, plan.left_out), "config": settings.as_dict()}
-    swept, ran = (out / SWEEP.file).exists(), bool(run_records(out))
+    swept = (out / SWEEP.file).exists()
+    guard_own(out, OVER_ALL, (job.folder for job in (*plan.jobs, *plan.sweep_jobs)))
     try:
         remove_arrays(out, name)
         write_json(out / name, info | {"cases": []})
         write_text(out / "config.resolved.toml", to_toml(settings))
         write_json(provenance_of(out / name), this_run())
-        remove_over_all(out, OVER_ALL, ran=ran)
+        remove_over_all(out, OVER_ALL)
     except WriteError as error:
         raise UsageError([str(error)]) from error
     remove_leftovers(out)

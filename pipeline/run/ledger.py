@@ -28,6 +28,8 @@ SCORED = (RESULT, ERRORS.file, POINTS.file, FRAMES)
 """The files that numbers over many cases are computed from; traced wires are guesses of other insertions' ones."""
 DATA = (*SCORED, BUDGET.file, ENTRIES.file, TIMINGS.file, PROVENANCE)
 PAGES = ("report.html",)
+TOP = (FILE, *DATA, *PAGES)
+"""Files of a case that lie in no folder of it."""
 VIEW, FIGURES = "view", "figures"
 _IN_VIEW = re.compile(
     r"scene\.mrml|lumen\.(?:seg\.nrrd|vtp|stl)|wire_(?:traced|simulated|true)(?:\.pvd|_\d+\.(?:vtp|mrk\.json))"
@@ -152,7 +154,8 @@ def _left_of(path: Path, known: Ledger | None) -> str:
     written, half = known.files if known else {}, path.name.startswith(".tmp-")
     if path.is_dir() or not (half or name in written or _is_ours(path)):
         return path.name
-    changed = known is not None and (name not in written or known.amiss(path.parents[1], [name]))
+    # a ledger that names nothing was emptied, and tells as little as none
+    changed = known and written and (name not in written or known.amiss(path.parents[1], [name]))
     if changed and not half and path.parent.name == VIEW and path.is_file():
         return _set_aside(path)
     path.unlink(missing_ok=True)
