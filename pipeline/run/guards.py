@@ -15,11 +15,9 @@ from pipeline.status import UsageError
 from pipeline.study.manifest import Case
 from pipeline.study.settings import Resolved
 from reports.case_files import find_cases
+from reports.inside import WRITTEN
 from reports.origin import ABSENT, WIRES, settings_of
 from reports.records import read_json, run_records
-
-WRITTEN = "cases", "sweep", "simulators", "figures"
-"""Folders of an output in which a run writes, and removes what was there before."""
 
 
 def guard_apart(out: Path, inputs: Iterable[Path]) -> None:
