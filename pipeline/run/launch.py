@@ -169,7 +169,8 @@ def launch(plan: Plan) -> tuple[Totals, Path]:
     info |= {"planned": [case.id for case in plan.manifest.cases], "doubts": continued(plan.manifest.cases)}
     info |= {"to_score": {case.id: case.frames_to_score for case in plan.manifest.cases if case.frames_to_score}}
     info |= {"fail_if": [gate.text for gate in plan.gates], **({"own": own} if (own := registered()) else {})}
-    name = f"run.{plan.shard.replace('/', '-')}.json" if plan.shard else "run.json"
+    # the numbers: 1/02 is the shard 1/2
+    name = "run.{}-{}.json".format(*_shard(plan.shard)) if plan.shard else "run.json"
     info |= {"left_out": _never_asked(out / name, plan.left_out), "config": settings.as_dict()}
     swept = (out / SWEEP.file).exists()
     guard_own(out, OVER_ALL, (job.folder for job in (*plan.jobs, *plan.sweep_jobs)))
