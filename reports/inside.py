@@ -6,28 +6,37 @@ from pathlib import Path
 
 from reports.case_files import listed
 
-FOLDERS = "cases", "figures", "simulators", "sweep", "view"
-"""Folders in which runs write, and remove what they wrote."""
+WRITTEN = "cases", "figures", "simulators", "sweep"
+"""Folders of an output in which runs write, and remove what was there before."""
+IN_A_CASE = "figures", "view"
+"""Those of a case."""
 
 
 def misleading_links(out: Path) -> list[str]:
-    """A sentence each on links below ``out`` that lead out of it, and on cases and folders that are links within it.
+    """A sentence each on links below ``out`` that lead out of it, and on results and folders that are links within it.
 
-    What is written through these would land elsewhere; a case behind a link would be counted under two names.
+    What is written through these would land elsewhere; a case behind a link would be counted under two names. Links
+    within it in a folder of the user's own are let be.
     """
     root, leading_out, twice, within = out.resolve(), [], [], []
     for path in _links(out):
         if not _target(path).is_relative_to(root):
             leading_out.append(path)
-        elif path.parent.name == "cases":
-            twice.append(path)
-        elif path.name in FOLDERS and path.is_dir():
-            within.append(path)
+        elif (parts := _place(path.relative_to(out).parts))[0] in WRITTEN:
+            if len(parts) == 2 and parts[0] != "figures":
+                twice.append(path)
+            elif len(parts) == 1 or (parts[0] == "cases" and len(parts) == 3 and parts[2] in IN_A_CASE):
+                within.append(path)
     return [
         *_said(leading_out, f"{out}: links lead out of it", "outputs follow none: remove them, or name another -o"),
-        *_said(twice, f"{out}: a case is a link to another", "it would be counted twice: remove it"),
+        *_said(twice, f"{out}: a result is a link to another", "it would be counted twice: remove it"),
         *_said(within, f"{out}: folders that runs write into are links", "outputs follow none: remove them"),
     ]
+
+
+def _place(parts: tuple[str, ...]) -> tuple[str, ...]:
+    """Where a link lies in an output, or in that of a simulator or of a point of a sweep, which are built alike."""
+    return _place(parts[2:]) if len(parts) > 2 and parts[0] in ("simulators", "sweep") else parts
 
 
 def _links(out: Path) -> Iterator[Path]:

@@ -63,7 +63,11 @@ def in_the_way(folder: Path, format: str, frames: int, *, fresh: bool = False) -
         return [f"{folder}: is a file; give a folder"]
     ours, manifest = set(earlier_files(folder)), folder / MANIFEST
     if manifest.exists() and manifest not in ours:
-        return [f"{manifest}: is not a manifest that synth wrote; give another folder"]
+        if SEAL not in _text(manifest):
+            return [f"{manifest}: is not a manifest that synth wrote; give another folder"]
+        if not fresh:
+            lost = f"{folder / TRUTH}: is missing, or was changed since synth wrote it; --fresh writes the study anew"
+            return edited(folder) or [lost]
     names = volume_names(format, frames)
     meant = {folder / name for name in (HDF5_FILE, TRUTH)} if format == "h5" else {folder / n for n in (*names, TRUTH)}
     there = {*folder.glob(f"frames/*.{format}"), *(p for name in names for p in folder.glob(f"{name}/*"))}

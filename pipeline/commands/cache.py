@@ -8,8 +8,9 @@ from pipeline.commands import complain, say
 
 HELP = "lumens, traces and the like that are kept, so that no run computes them again"
 UNITS = {"K": 2**10, "M": 2**20, "G": 2**30, "T": 2**40}
-MOST = 2**63
 """A size has one: `--limit 5`, meant as 5 GB, would remove all but 5 bytes."""
+MOST = 2**63
+"""Bytes; no disk holds more, and a number of 400 digits is no float."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

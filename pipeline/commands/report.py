@@ -77,7 +77,8 @@ def _unusable(out: Path) -> list[str]:
     from reports.inside import misleading_links
     from reports.records import damaged_records
 
-    return misleading_links(out) or damaged_records(out) or not_loaded(out)
+    again = f"pipeline.cli.main(['report', {str(out)!r}])"
+    return misleading_links(out) or damaged_records(out) or not_loaded(out, again)
 
 
 def _without_cases(out: Path) -> str:

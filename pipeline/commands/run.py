@@ -182,7 +182,11 @@ def _to_score(args: argparse.Namespace, manifest: "Manifest") -> "tuple[Manifest
 def _guard(args: argparse.Namespace, manifest: "Manifest", computed: "Set[str]", settings: "Resolved") -> None:
     """Refuse to write into an OUT that holds what the cases to be computed may not stand beside."""
     from pipeline.run.guards import guard_kept, guard_out, guard_stages
+    from pipeline.run.own import not_loaded
+    from pipeline.status import UsageError
 
+    if not args.fresh and (lost := not_loaded(args.out, "pipeline.cli.main(['run', ...])")):
+        raise UsageError([f"{text}, or say --fresh (compute again)" for text in lost])
     if not (args.resume or args.fresh):
         guard_out(args.out, manifest.path, settings)
     others = {case.id: case for case in manifest.cases if case.id not in computed}

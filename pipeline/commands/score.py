@@ -183,11 +183,14 @@ def _judged_names(args: argparse.Namespace) -> list[str]:
 
 def _with_wires(cases: "Sequence[Case]", place: Path | None, args: argparse.Namespace) -> "tuple[Case, ...]":
     """The cases with the wires that a place holds for them; with the solver's own where there is no place."""
+    from pipeline.load import Source
     from pipeline.study.others import Others, found_for
 
-    stated, ids, made = {"space": args.space, "unit": args.unit}, [case.id for case in cases], []
+    if place is None:
+        return tuple(case.model_copy(update={"simulated": None}) for case in cases)
+    stated, ids, made = Others(space=args.space, unit=args.unit), [case.id for case in cases], []
     for case in cases:
-        files = None if place is None else found_for(case.id, place, ids)
-        others = None if files is None else Others.model_validate(stated | ({"files": files} if files else {}))
-        made.append(case.model_copy(update={"simulated": others}))
+        # not as a manifest writes them: these may lead out of the working folder, and hold a #
+        files = tuple(Source(path) for path in found_for(case.id, place, ids))
+        made.append(case.model_copy(update={"simulated": stated.model_copy(update={"files": files})}))
     return tuple(made)

@@ -188,7 +188,8 @@ def read_truth(path: Path, frame_count: int | None) -> list[Array]:
             raise unusable(path, f"frame {number} holds something else than numbers; expected {expected}") from None
     frame_count = len(curves) if frame_count is None else frame_count
     if len(curves) != frame_count or any(c.ndim != 2 or c.shape[1] != 3 for c in curves):
-        raise unusable(path, f"holds {len(curves)} curves, expected {frame_count} of shape (n, 3), one per frame")
+        few = "; where synth was interrupted the study is incomplete: give synth again" * (len(curves) > frame_count)
+        raise unusable(path, f"holds {len(curves)} curves, expected {frame_count} of shape (n, 3), one per frame{few}")
     curves = [distinct(curve) for curve in curves]
     for number, curve in enumerate(curves):
         if len(curve) < 2:

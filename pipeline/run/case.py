@@ -76,17 +76,19 @@ class Job:
         return digest((self.case, self.settings.config, given, self.until, code, ERRORS.columns, *named))
 
 
-def clear(folder: Path) -> list[str]:
-    """Create a case's folder, or remove from it the files of an earlier result; names of what else lies among them."""
+def clear(folder: Path) -> str:
+    """Create a case's folder, or remove the files of an earlier result; a sentence on what else is among them."""
     with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
-    for name in (ledger.FILE, *ledger.DATA, *ledger.PAGES):
+    known = ledger.read(folder)
+    kept = [name for part in (ledger.VIEW, ledger.FIGURES) for name in ledger.remove(folder / part, known)]
+    for name in ledger.TOP:
         with writing(folder / name):
             (folder / name).unlink(missing_ok=True)
     with writing(folder):
         for path in folder.glob(".tmp-*"):  # of a run that was killed here: nobody else is at work in this folder
             path.unlink(missing_ok=True)
-    return [name for part in (ledger.VIEW, ledger.FIGURES) for name in ledger.remove(folder / part)]
+    return f"not of a run, and kept: {listed(kept)}" * bool(kept)
 
 
 def finished(job: Job, key: str) -> bool:
@@ -128,10 +130,8 @@ def run_case(job: Job) -> None:
             return
         kept = clear(job.folder)
         progress.start()
-        if kept:
-            progress.warn(f"not of a run, and left as it is: {listed(kept)}")
-        if again:
-            progress.warn(again)
+        for said in filter(None, (kept, again)):
+            progress.warn(said)
         _compute(job, hashed, inputs, progress)
 
 
@@ -201,7 +201,7 @@ def _draw(job: Job, progress: CaseProgress) -> None:
 
 def draw(folder: Path, pages: ledger.Pages, cores: int = 1) -> None:
     """Draw the pages of a case anew, and record them."""
-    ledger.remove(folder / ledger.FIGURES)
+    ledger.remove(folder / ledger.FIGURES, ledger.read(folder))
     render_case(folder, pages == "embedded", each_on(cores))
     ledger.record_pages(folder, pages)
 

@@ -38,12 +38,11 @@ def remove_records(out: Path, manifest: str) -> None:
                 path.unlink(missing_ok=True)
 
 
-def remove_over_all(out: Path, names: Sequence[str], *, ran: bool) -> None:
-    """Remove files over all cases, where runs have written them: ``ran``. A folder of such a name is refused."""
+def remove_over_all(out: Path, names: Sequence[str]) -> None:
+    """Remove files over all cases. A folder of such a name is refused."""
     for path in (out / name for name in names):
-        if ran or path.is_dir():
-            with writing(path):
-                path.unlink(missing_ok=True)
+        with writing(path):
+            path.unlink(missing_ok=True)
 
 
 def _of_a_run(folder: Path) -> bool:

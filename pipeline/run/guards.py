@@ -5,6 +5,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from pipeline.run import ledger
 from pipeline.run.hashing import file_hash
 from pipeline.run.inputs import named_files, other_file, stated
 from pipeline.run.log import STAGES, Stage
@@ -14,11 +15,9 @@ from pipeline.status import UsageError
 from pipeline.study.manifest import Case
 from pipeline.study.settings import Resolved
 from reports.case_files import find_cases
+from reports.inside import WRITTEN
 from reports.origin import ABSENT, WIRES, settings_of
 from reports.records import read_json, run_records
-
-WRITTEN = "cases", "sweep", "simulators", "figures"
-"""Folders of an output in which a run writes, and removes what was there before."""
 
 
 def guard_apart(out: Path, inputs: Iterable[Path]) -> None:
@@ -61,6 +60,19 @@ def guard_out(out: Path, manifest: Path, settings: Resolved) -> None:
     others = next(filter(None, (_changed(read_json(info), settings) for info in infos)), "")
     if others:
         raise UsageError([f"{out} was run with other settings: {others}; name another folder, or {allowed}"])
+
+
+def guard_own(out: Path, names: Iterable[str], cases: Iterable[Path]) -> None:
+    """Refuse to replace files of a user's own: where no run was into a folder, those with the names of ours are.
+
+    names : of files over all cases.     cases : the folders to write into; one with a ledger was copied from a run.
+    """
+    if run_records(out):
+        return
+    inside = (folder for folder in cases if not (folder / ledger.FILE).exists())
+    meant = (*(out / name for name in names), *(folder / name for folder in inside for name in ledger.TOP))
+    if own := next((path for path in meant if path.is_file()), None):
+        raise UsageError([f"{own}: is of no run, and would be replaced; name another folder, or move it away"])
 
 
 def guard_kept(out: Path, others: Mapping[str, Case], settings: Resolved, *, files: bool) -> None:

@@ -18,6 +18,7 @@ from pipeline.run.cache import Store, forget_lumen
 from pipeline.run.case import Job, clear, each_on, finished, run_case
 from pipeline.run.earlier import remove_arrays, remove_others, remove_over_all, remove_records
 from pipeline.run.gate import Gate
+from pipeline.run.guards import guard_own
 from pipeline.run.hashing import file_hash
 from pipeline.run.inputs import stated
 from pipeline.run.log import last_stage
@@ -38,7 +39,7 @@ from reports.atomic import WriteError, remove_leftovers, write_text, writing
 from reports.case_files import counted, provenance_of
 from reports.doubts import AMONG
 from reports.gates import GATES
-from reports.records import read_json, run_records
+from reports.records import read_json
 from reports.run_page import render_index
 from reports.schema import FAILURES, OVERALL_FILE, SUMMARY, SWEEP, TIMINGS
 from reports.sweep import not_run
@@ -168,15 +169,17 @@ def launch(plan: Plan) -> tuple[Totals, Path]:
     info |= {"planned": [case.id for case in plan.manifest.cases], "doubts": continued(plan.manifest.cases)}
     info |= {"to_score": {case.id: case.frames_to_score for case in plan.manifest.cases if case.frames_to_score}}
     info |= {"fail_if": [gate.text for gate in plan.gates], **({"own": own} if (own := registered()) else {})}
-    name = f"run.{plan.shard.replace('/', '-')}.json" if plan.shard else "run.json"
+    # the numbers: 1/02 is the shard 1/2
+    name = "run.{}-{}.json".format(*_shard(plan.shard)) if plan.shard else "run.json"
     info |= {"left_out": _never_asked(out / name, plan.left_out), "config": settings.as_dict()}
-    swept, ran = (out / SWEEP.file).exists(), bool(run_records(out))
+    swept = (out / SWEEP.file).exists()
+    guard_own(out, OVER_ALL, (job.folder for job in (*plan.jobs, *plan.sweep_jobs)))
     try:
         remove_arrays(out, name)
         write_json(out / name, info | {"cases": []})
         write_text(out / "config.resolved.toml", to_toml(settings))
         write_json(provenance_of(out / name), this_run())
-        remove_over_all(out, OVER_ALL, ran=ran)
+        remove_over_all(out, OVER_ALL)
     except WriteError as error:
         raise UsageError([str(error)]) from error
     remove_leftovers(out)
@@ -254,10 +257,10 @@ def _write_lost(outcome: Outcome[Job, None]) -> None:
     if owner:
         sys.stderr.write(f"{job.case.id}: {outcome.error}; left to {owner}, which is at work on it\n")
         return
-    clear(job.folder)
+    kept = clear(job.folder)
     stage = last_stage(log)
     with writing(log), log.open("a", encoding="utf-8") as file:
-        file.write(outcome.log + "\n")
+        file.writelines(f"{said}\n" for said in (kept, outcome.log) if said)
     lost(job.case.id, outcome.status, outcome.error, job.case, stage).write(job.folder)
 
 

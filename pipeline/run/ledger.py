@@ -6,6 +6,7 @@ case.
 """
 
 import hashlib
+import itertools
 import re
 import stat
 from collections.abc import Iterable, Iterator
@@ -27,6 +28,8 @@ SCORED = (RESULT, ERRORS.file, POINTS.file, FRAMES)
 """The files that numbers over many cases are computed from; traced wires are guesses of other insertions' ones."""
 DATA = (*SCORED, BUDGET.file, ENTRIES.file, TIMINGS.file, PROVENANCE)
 PAGES = ("report.html",)
+TOP = (FILE, *DATA, *PAGES)
+"""Files of a case that lie in no folder of it."""
 VIEW, FIGURES = "view", "figures"
 _IN_VIEW = re.compile(
     r"scene\.mrml|lumen\.(?:seg\.nrrd|vtp|stl)|wire_(?:traced|simulated|true)(?:\.pvd|_\d+\.(?:vtp|mrk\.json))"
@@ -130,22 +133,40 @@ def _found(folder: Path) -> Iterator[str]:
         yield from sorted(f"{part}/{p.name}" for p in (folder / part).glob("*") if _is_ours(p) and p.is_file())
 
 
-def remove(place: Path) -> list[str]:
-    """Remove from a case's ``view`` or ``figures`` what runs write there, and the folder; names of what else is in it.
+def remove(place: Path, known: Ledger | None) -> list[str]:
+    """Remove from a case's ``view`` or ``figures`` what runs wrote there, and the folder; names of what is left in it.
 
-    3D Slicer saves what a user corrects beside what it has opened.
+    known : the ledger of what lies there. 3D Slicer saves what a user corrects over the file that it has opened: what
+    the ledger does not know as it is gets another name in ``view``. Pictures are drawn from the data alone.
     """
     if not place.is_dir():
         return []
     with writing(place):
-        there = sorted(place.iterdir())
-        kept = [path for path in there if path.is_dir() or not (_is_ours(path) or path.name.startswith(".tmp-"))]
-        for path in there:
-            if path not in kept:
-                path.unlink(missing_ok=True)
+        kept = [name for path in sorted(place.iterdir()) if (name := _left_of(path, known))]
         if not kept:
             place.rmdir()
-    return [f"{place.name}/{path.name}" for path in kept]
+    return [f"{place.name}/{name}" for name in sorted(kept)]
+
+
+def _left_of(path: Path, known: Ledger | None) -> str:
+    """Remove a file if it is as a run wrote it; its name afterwards, empty where it is gone."""
+    name = f"{path.parent.name}/{path.name}"
+    written, half = known.files if known else {}, path.name.startswith(".tmp-")
+    if path.is_dir() or not (half or name in written or _is_ours(path)):
+        return path.name
+    # a ledger that names nothing was emptied, and tells as little as none
+    changed = known and written and (name not in written or known.amiss(path.parents[1], [name]))
+    if changed and not half and path.parent.name == VIEW and path.is_file():
+        return _set_aside(path)
+    path.unlink(missing_ok=True)
+    return ""
+
+
+def _set_aside(path: Path) -> str:
+    """Put ``yours`` into the name of a file that a run would write over: wire_traced_000.yours.mrk.json."""
+    stem, _, ending = path.name.partition(".")
+    names = (f"{stem}.yours{number or ''}.{ending}" for number in itertools.count())
+    return path.rename(next(free for name in names if not (free := path.with_name(name)).exists())).name
 
 
 def _is_ours(path: Path) -> bool:

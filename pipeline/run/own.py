@@ -20,15 +20,22 @@ def registered() -> dict[str, str]:
     return {column.name: column.module for column in ERRORS if column.module}
 
 
-def not_loaded(out: Path) -> list[str]:
-    """Columns of the runs into a folder that were registered where this process has not: tables would lose them."""
+def not_loaded(out: Path, call: str) -> list[str]:
+    """Columns of the runs into a folder that were registered where this process has not: tables would lose them.
+
+    call : what to do where they are registered, in Python.
+    """
     known = {name: module for run in runs_in(out) for name, module in run.get("own", {}).items()}
     return [
-        f"{name} was registered by {module}, which is not loaded here: its columns would be lost; in Python import it, "
-        f"then pipeline.cli.main(['report', {str(out)!r}])"
+        f"{name} was registered by {module}, which is not loaded here: its columns would be lost; {_do(module, call)}"
         for name, module in known.items()
         if name not in registered()
     ]
+
+
+def _do(module: str, call: str) -> str:
+    """How to give a command where a module's columns are registered."""
+    return f"call {call} at the end of that script" if module in SCRIPTS else f"in Python import it, then {call}"
 
 
 def refuse_scripts(own: Mapping[str, str]) -> None:

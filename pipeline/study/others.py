@@ -33,7 +33,7 @@ WORDS: JsonDict = {"$comment": f"{NAMES['$comment']}, or a table {{files = ..., 
 OthersText = Annotated[Others | None, BeforeValidator(written_out), Field(json_schema_extra=WORDS)]
 
 
-def found_for(case: str, place: Path, cases: Sequence[str]) -> list[str]:
+def found_for(case: str, place: Path, cases: Sequence[str]) -> list[Path]:
     """The files that a place holds for a case, in natural order: of ``--curves``, a folder, a file or a pattern.
 
     A folder holds one of its own for each case (``CASE/`` or ``CASE.h5``) or is an output of `wireval run`; where the
@@ -47,7 +47,7 @@ def found_for(case: str, place: Path, cases: Sequence[str]) -> list[str]:
         raise UsageError([f"--curves {place}: no such file or folder"])
     if not is_folder(place):
         size_of(place)
-        return [str(place)] if alone else _refuse(case, place, "one file serves one case")
+        return [place] if alone else _refuse(case, place, "one file serves one case")
     ran = [path.name for path in place.glob("cases/*") if is_folder(path)]
     if ran and case not in ran:
         has = f"{', '.join(sorted(ran)[:4])}{' ...' * (len(ran) > 4)}"
@@ -58,7 +58,7 @@ def found_for(case: str, place: Path, cases: Sequence[str]) -> list[str]:
     if here is None:
         return _refuse(case, place, f"found neither {case}/ nor {case}.h5 in it")
     if here.is_file():
-        return [str(here)]
+        return [here]
     inside = _wires_in(here)
     kinds = sorted({kind_of(path) for path in inside})
     if len(kinds) > 1:
@@ -89,7 +89,7 @@ def lost_in(place: Path, cases: Sequence[str]) -> list[str]:
     return lost if len(lost) < len(cases) else []
 
 
-def _matching(case: str, pattern: Path) -> list[str]:
+def _matching(case: str, pattern: Path) -> list[Path]:
     """The files that a pattern matches; at least one."""
     found = list(pattern.parent.glob(pattern.name))
     if not found:
@@ -98,11 +98,11 @@ def _matching(case: str, pattern: Path) -> list[str]:
     return _sorted(found) if folder is None else _refuse(case, pattern, f"it matches a folder, {folder.name}")
 
 
-def _sorted(paths: Any) -> list[str]:
-    return [str(path) for path in in_order(paths, lambda path: path.name)]
+def _sorted(paths: list[Path]) -> list[Path]:
+    return in_order(paths, lambda path: path.name)
 
 
-def _refuse(case: str, place: Path, why: str) -> list[str]:
+def _refuse(case: str, place: Path, why: str) -> list[Path]:
     do = f"give a folder with one file a frame in {case}/ (left empty, every frame counts as failed), "
     do += "or the output of a run of this manifest"
     raise UsageError([f"case {case!r}: --curves {place}: {why}; {do}"])

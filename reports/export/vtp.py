@@ -39,8 +39,9 @@ def write_collection(folder: Path, stem: str) -> Path | None:
     root = ET.Element("VTKFile", type="Collection", version="0.1", byte_order="LittleEndian")
     sets = ET.SubElement(root, "Collection")
     for path in sorted(folder.glob(f"{stem}_[0-9]*.vtp")):
-        frame = str(int(path.stem.removeprefix(f"{stem}_")))
-        ET.SubElement(sets, "DataSet", timestep=frame, group="", part="0", file=path.name)
+        frame = path.stem.removeprefix(f"{stem}_")
+        if frame.isdecimal():  # else a copy of the user's own
+            ET.SubElement(sets, "DataSet", timestep=str(int(frame)), group="", part="0", file=path.name)
     if not len(sets):
         return None
     collection = folder / f"{stem}.pvd"

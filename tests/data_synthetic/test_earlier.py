@@ -111,15 +111,33 @@ def test_scans_without_a_manifest_of_ours_are_overwritten_only_if_asked_for(
         ("schema = 1", "schema = "),
     ],
 )
-def test_a_manifest_that_is_not_ours_is_never_written_over(
+def test_a_manifest_that_was_changed_is_written_over_only_if_asked_for(
     longer: Study, tmp_path: Path, change: tuple[str, str]
 ) -> None:
+    """It was called none of synth's, with --fresh too; one without the line by which synth knows its own is none."""
     manifest = write_study(longer, tmp_path)
-    manifest.write_text(manifest.read_text(encoding="utf-8").replace(*change), encoding="utf-8")
+    written = files(tmp_path)
+    text = manifest.read_text(encoding="utf-8").replace(*change)
+    manifest.write_text(text.rpartition("# written by synth")[0], encoding="utf-8")
     there = files(tmp_path)
     with pytest.raises(ValueError, match=r"manifest\.toml: is not a manifest that synth wrote"):
-        write_study(longer, tmp_path)
+        write_study(longer, tmp_path, fresh=True)
     assert files(tmp_path) == there
+    manifest.write_text(text, encoding="utf-8")
+    with pytest.raises(ValueError, match=r"manifest\.toml: was changed since synth wrote it, .*--fresh overwrites it"):
+        write_study(longer, tmp_path)
+    write_study(longer, tmp_path, fresh=True)
+    assert files(tmp_path) == written
+
+
+def test_a_study_whose_truth_is_gone_is_written_anew_only_if_asked_for(longer: Study, tmp_path: Path) -> None:
+    write_study(longer, tmp_path)
+    written = files(tmp_path)
+    (tmp_path / "truth.json").unlink()
+    with pytest.raises(ValueError, match=r"truth\.json: is missing, .* --fresh writes the study anew"):
+        write_study(longer, tmp_path)
+    write_study(longer, tmp_path, fresh=True)
+    assert files(tmp_path) == written
 
 
 def test_a_file_in_place_of_the_folder_is_refused(tmp_path: Path) -> None:

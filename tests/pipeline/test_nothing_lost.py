@@ -406,10 +406,53 @@ def test_files_of_a_users_own_stay_among_those_of_a_run(
     assert not {"view/corrected_000.mrk.json", "figures/mine.svg"} & ours.files.keys()
     capsys.readouterr()
     assert run(study, out, "--fresh", "--until", "load") == 0
-    assert "not of a run, and left as it is: view/corrected_000.mrk.json, figures/mine.svg" in capsys.readouterr().err
+    assert "not of a run, and kept: view/corrected_000.mrk.json, figures/mine.svg" in capsys.readouterr().err
     assert [*own[1].parent.iterdir()] == [own[1]]
     assert not (own[0].parent / "wire_traced_000.vtp").exists()
     assert {path.read_text(encoding="utf-8") for path in (*own, *others)} == {'{"my": 1}'}
+
+
+def test_what_a_user_saves_over_a_file_of_a_run_is_kept_under_another_name(
+    study: Path, out: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """3D Slicer's Save writes to the file that it has opened: the next run removed what was corrected there."""
+    place, name = case_of(out) / "view", "wire_traced_000"
+    for mine in ("first", "second"):
+        (place / f"{name}.mrk.json").write_text(mine, encoding="utf-8")
+        assert run(study, out, "--fresh", "--until", "load") == 0
+    said = f"not of a run, and kept: view/{name}.yours.mrk.json, view/{name}.yours1.mrk.json\n"
+    assert said in capsys.readouterr().err
+    assert said in (case_of(out) / "log.txt").read_text(encoding="utf-8")
+    (place / f"{name}.yours.vtp").touch()
+    assert run(study, out, "--fresh", "--until", "trace") == 0, "a frame had the number '000.yours'"
+    assert (place / f"{name}.yours.mrk.json").read_text(encoding="utf-8") == "first"
+    assert (place / f"{name}.yours1.mrk.json").read_text(encoding="utf-8") == "second"
+
+
+def test_a_picture_that_a_ledger_names_goes_whatever_it_is_called(study: Path, out: Path) -> None:
+    """One that an earlier version drew under another name was called the user's own."""
+    ours = case_of(out) / "figures" / "error_by_depth.png"
+    assert ours.exists()
+    text = (case_of(out) / ledger.FILE).read_text(encoding="utf-8").replace("/error_by_depth.png", "/renamed.png")
+    (case_of(out) / ledger.FILE).write_text(text, encoding="utf-8")
+    ours.rename(ours.with_name("renamed.png"))
+    assert run(study, out, "--fresh", "--until", "load") == 0
+    assert not ours.parent.exists()
+
+
+@pytest.mark.parametrize("name", ["summary.csv", "index.html", "cases/bifurcation/errors.csv"])
+@pytest.mark.parametrize("how", ["--resume", "--fresh"])
+def test_results_replace_no_file_of_a_users_own(
+    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str, how: str
+) -> None:
+    """A folder without a run is told to be written into with --resume or --fresh: they replaced what it held."""
+    own = tmp_path / name
+    own.parent.mkdir(parents=True, exist_ok=True)
+    own.write_text("mine", encoding="utf-8")
+    assert run(study, tmp_path, how, "--until", "load") == 2
+    assert f"{own}: is of no run, and would be replaced; name another folder" in capsys.readouterr().err
+    assert [path for path in tmp_path.rglob("*") if path.is_file()] == [own]
+    assert own.read_text(encoding="utf-8") == "mine"
 
 
 @pytest.mark.parametrize("name", ["summary.csv", "run_dir.json"])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
@@ -19,7 +20,7 @@ from pipeline.compare.nulls import Clues, PredictorInputs
 from pipeline.model import Array
 from pipeline.run import ledger
 from pipeline.run.case import Job, finished
-from pipeline.run.own import refuse_scripts, registered, with_own
+from pipeline.run.own import not_loaded, refuse_scripts, registered, with_own
 from pipeline.status import UsageError
 from pipeline.study.manifest import read_manifest
 from pipeline.study.settings import resolve
@@ -68,6 +69,16 @@ def test_workers_have_what_a_module_registers_or_it_is_refused(as_before: None) 
     refuse_scripts(own)
     with pytest.raises(UsageError, match="own_mm: registered in a script or a notebook"):
         refuse_scripts({"own_mm": "__main__"})
+
+
+@pytest.mark.parametrize(
+    ("module", "do"),
+    [("__main__", "call main([]) at the end of that script"), ("mine.errors", "in Python import it, then main([])")],
+)
+def test_what_a_script_has_registered_cannot_be_imported(tmp_path: Path, module: str, do: str) -> None:
+    (tmp_path / "run.json").write_text(json.dumps({"own": {"own_mm": module}}), encoding="utf-8")
+    (said,) = not_loaded(tmp_path, "main([])")
+    assert said.endswith(f"which is not loaded here: its columns would be lost; {do}")
 
 
 @pytest.mark.parametrize("told", ["its tip", ""])
@@ -156,5 +167,8 @@ def test_a_metric_and_a_predictor_from_outside(
     tables = [(out / name).read_bytes() for name in ("summary.csv", "overall.csv")]
     ERRORS._drop(ERRORS["near_share"])
     assert main(["report", str(out)]) == 2
-    assert f"near_share was registered by {__name__}, which is not loaded here" in capsys.readouterr().err
+    said = f"near_share was registered by {__name__}, which is not loaded here"
+    assert said in capsys.readouterr().err
+    assert main([*words, "--only", "bend"]) == 2
+    assert said in capsys.readouterr().err
     assert tables == [(out / name).read_bytes() for name in ("summary.csv", "overall.csv")], "its column was dropped"

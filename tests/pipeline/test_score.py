@@ -631,6 +631,19 @@ def test_where_curves_are_looked_for(known: Known, tmp_path: Path, capsys: pytes
 
 
 @pytest.mark.usefixtures("undrawn")
+def test_a_place_that_was_typed_is_no_string_of_a_manifest(
+    known: Known, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A path that goes up, and a # in its name, ended in a traceback."""
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    wires = write_csv(Path("../run#1"), known[1])
+    (wires / "wire_000.csv").rename(wires / "wire#_000.csv")
+    assert main(["score", str(known[0]), "--curves", "mine=../run#1", "-o", "out", "--without-own", *QUICK]) == 0
+    assert list(errors_of(Path("out"))["status"]) == ["ok"] * FRAMES
+
+
+@pytest.mark.usefixtures("undrawn")
 def test_a_score_of_others_is_not_replaced(known: Known, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The same command with another --curves put its results in the place of the first ones."""
     one, two = write_csv(tmp_path / "one", known[1]), write_csv(tmp_path / "two", known[1])

@@ -11,6 +11,7 @@ import pytest
 import wireval
 from pipeline.cli import main
 from reports.case_files import not_run
+from reports.records import run_records
 from tests.pipeline.test_calibrate import PARAMETERS
 
 QUICK = ("--until", "load", "-q")
@@ -57,6 +58,13 @@ def test_shards_of_which_one_is_empty_are_merged(study: Path, tmp_path: Path) ->
             shutil.copytree(tmp_path / str(n), tmp_path / "merged", dirs_exist_ok=True)
     for name in ("merged", "one"):
         assert main(["report", str(tmp_path / name), "--overview"]) == 0
+
+
+def test_a_shard_is_known_by_its_numbers(study: Path, tmp_path: Path) -> None:
+    """1/02 was another one than 1/2, and stood beside it."""
+    for text in ("1/2", "1/02"):
+        assert main(["run", str(study), "-o", str(tmp_path), "--shard", text, *QUICK]) == 0
+    assert [path.name for path in run_records(tmp_path)] == ["run.1-2.json"]
 
 
 def test_from_python_an_empty_shard_has_empty_tables(study: Path, tmp_path: Path) -> None:

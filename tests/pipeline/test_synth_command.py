@@ -128,6 +128,14 @@ def test_a_manifest_that_was_changed_is_not_overwritten(
     assert manifest.read_text(encoding="utf-8") == written
 
 
+def test_a_study_that_was_interrupted_is_called_incomplete(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Its manifest is written first: it was told to hold too many depths."""
+    assert main(["synth", "short-wire", "-o", str(tmp_path), "--size", "54", "--frames", "2", "-q"]) == 0
+    (tmp_path / "frames" / "frame_001.mha").unlink()
+    assert main(["check", str(tmp_path)]) == 2
+    assert "the study is incomplete: give synth again" in capsys.readouterr().err
+
+
 def test_no_folder(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["synth", "bend"]) == 2
     assert "-o DIR is missing" in capsys.readouterr().err

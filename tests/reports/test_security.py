@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pandas as pd
+import pytest
 
 from pipeline.cli import main
 from reports import tables
@@ -51,9 +52,22 @@ def test_a_folder_that_a_run_writes_into_is_no_link(tmp_path: Path) -> None:
     assert f"folders that runs write into are links: {tmp_path / 'cases' / 'a' / 'figures'} -> " in told
 
 
-def test_a_case_that_is_a_link_to_another_is_refused(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    "place", ["cases", "simulators", "sweep", "simulators/mine/cases", "sweep/solver.segment_mm=1/cases"]
+)
+def test_a_result_that_is_a_link_to_another_is_refused(tmp_path: Path, place: str) -> None:
     """It would be pooled twice, under two names; what it held itself is gone."""
-    (tmp_path / "cases" / "b").mkdir(parents=True)
-    (tmp_path / "cases" / "a").symlink_to("b")
+    (tmp_path / place / "b").mkdir(parents=True)
+    (tmp_path / place / "a").symlink_to("b")
     (told,) = misleading_links(tmp_path)
-    assert f"a case is a link to another: {tmp_path / 'cases' / 'a'} -> b; it would be counted twice" in told
+    assert f"a result is a link to another: {tmp_path / place / 'a'} -> b; it would be counted twice" in told
+
+
+def test_links_of_a_users_own_within_an_output_are_let_be(tmp_path: Path) -> None:
+    """OUT/talk/figures -> ../figures was refused by its name."""
+    for place in ("figures", "talk/cases", "cases/a/figures", "cases/a/mine"):
+        (tmp_path / place).mkdir(parents=True)
+    (tmp_path / "talk" / "figures").symlink_to("../figures")
+    (tmp_path / "talk" / "cases" / "best").symlink_to("../../cases/a")
+    (tmp_path / "cases" / "a" / "mine" / "view").symlink_to("../figures")
+    assert misleading_links(tmp_path) == []
