@@ -24,7 +24,7 @@ from pipeline.trace.attempt import (
     sharpest_deg,
     warm,
 )
-from pipeline.trace.bends import bent
+from pipeline.trace.bends import bent, hook_error
 from pipeline.trace.config import TraceConfig
 from pipeline.trace.crests import SEED_SIGMAS, STRICT_BEND
 from pipeline.trace.doubts import doubted, no_wire, not_washed_out
@@ -194,11 +194,12 @@ def _prolonged(image: Subtraction, best: Candidate, entry: EntryPose) -> Candida
 
 
 def _model_error(image: Subtraction, best: Candidate) -> Array:
-    """Errors (n,), mm, that the model adds to those by noise: bends shorter than its knots, and a modelled wall."""
+    """Errors (n,), mm, that the model adds to those by noise: bends shorter than its knots, hooks, a modelled wall."""
     tube = best.attempt.tube
     rough = np.mean(np.diff(tube.controls, n=4, axis=0) ** 2, axis=1) if len(tube.controls) > 4 else np.zeros(1)
     knots = shares_of(tube, best.points) * tube.intervals
     bends = BEND_SHARE * np.sqrt(np.interp(knots, 1.0 + np.arange(len(rough)), rough))
+    bends = np.hypot(bends, hook_error(image, best.attempt, best.points))
     if not image.without_reference:
         return np.asarray(bends)
     depth = -image.depth_at(best.points) / image.voxel

@@ -11,8 +11,8 @@ from pipeline.trace.tube import Tube, spline_through, tint_nodes
 CLOSEST = 8.0
 """Least distance between knots, voxels, of all but hooks: closer ones only follow the noise."""
 IN_HOOKS = 4.5
-"""The same of wires with a hook, which turns by a radian and more from knot to knot: half a circle of 2.7 voxels lies
-between two knots, and its tip was 0.55 voxel off."""
+"""The same of wires with a hook (``bends.HOOK``): half a circle of 2.7 voxels lies between two wide knots, and its tip
+was 0.55 voxel off."""
 KNOTS_PER_PITCH = 2.0
 """Least distance between knots, in :func:`slice_pitch`: with one knot a slice the curve follows each slice's own error
 (0.15 mm of ripple at 2.5 mm slices)."""

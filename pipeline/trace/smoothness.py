@@ -21,6 +21,9 @@ def smoothness(controls: Array, knot: float, voxel: float) -> Array:
 
     Its tails are Cauchy's: half a circle of 4 voxels has third differences of 9 standard deviations. A Gaussian prior
     straightened it, and its tip lay 0.2 voxel outwards.
+
+    The fit's covariance takes these weights, 1 / (1 + s^2 / 5) at s standard deviations, for the prior's curvature.
+    At 3 to 5 that is too much, as Cauchy's own is negative there: sigma of hooks needs ``bends.hook_error``.
     """
     loose = STIFFNESS * min(1.0, knot / (FULL_KNOT * voxel)) ** 3 * voxel
     block = _heavy_tailed(controls, 3, loose)

@@ -7,7 +7,7 @@ import pytest
 
 from pipeline.model import Volume
 from pipeline.segment import segment
-from pipeline.trace import trace
+from pipeline.trace import attempt, trace
 from tests.later import later
 from tests.studies.seeing import render
 
@@ -45,3 +45,22 @@ def test_the_tip_of_a_hook_is_not_drawn_outwards(radius: float, most: float) -> 
         share.append(off / curve.sigma_mm[-1])
     assert np.mean(outwards) < most, f"{outwards}"
     assert np.mean(share) < 2.5, f"{share}"
+
+
+def test_a_hook_does_not_lie_where_its_fit_happened_to_stop(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Stopped at the first step below 0.02 voxel the tip lay 0.16 voxel from where further steps lead."""
+    frame, still, true, direction = hooked(0.8, 1, 18.0)
+    lumen, tips = segment(still, true[:1]), []
+    for limits in (attempt.SETTLED, (200, 1e-4)):
+        monkeypatch.setattr(attempt, "SETTLED", limits)
+        tips.append(trace(frame, lumen, true[0], direction, reference=still).points_mm[-1] / VOXEL)
+    assert np.linalg.norm(tips[1] - tips[0]) < 0.05
+
+
+def test_a_hook_that_noise_draws_outwards_says_so() -> None:
+    """0.64 voxel outwards at a contrast of 12, sigma 0.13, and ok."""
+    frame, still, true, direction = hooked(0.8, 1, 12.0)
+    curve = trace(frame, segment(still, true[:1]), true[0], direction, reference=still)
+    off = np.linalg.norm(true[-1] - curve.points_mm[-1])
+    assert off < 2.0 * curve.sigma_mm[-1]
+    assert curve.sigma_mm[10] < 0.1 * VOXEL, "the straight shaft is as sure as ever"
