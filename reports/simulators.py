@@ -44,9 +44,10 @@ def render_simulators(out_dir: Path, embed: bool = False) -> Path:
     alien = {name: _not_ours(own, warnings.get(OURS, {})) for name, own in warnings.items()}
     alone = {str(row["simulator"]): row for row in table.to_dict("records")}
     few = set(_with_few(table)["simulator"])
+    closed = {name: gates_in(folder, out_dir)["closed"] for name, folder in folders.items()}
     told = [
         {"name": name, "link": links[name]}
-        | _said(alone[name], folder, alien[name], copied.get(name, ""), few=name in few)
+        | _said(alone[name], folder, alien[name], copied.get(name, ""), closed[name], few=name in few)
         for name, folder in folders.items()
     ]
     page = {
@@ -76,7 +77,9 @@ def folders_in(out_dir: Path) -> dict[str, Path]:
     return {name: out_dir / "simulators" / name if number else out_dir for number, name in enumerate(names)}
 
 
-def _said(alone: Mapping[Any, Any], folder: Path, lines: Sequence[str], copied: str, *, few: bool) -> dict[str, Any]:
+def _said(
+    alone: Mapping[Any, Any], folder: Path, lines: Sequence[str], copied: str, closed: Sequence[str], *, few: bool
+) -> dict[str, Any]:
     """Badge and verdict of a simulator, and warnings of its cases: these ``lines``.
 
     alone : its row of simulators.csv, which counts its frames also where nothing is pooled over them, and whose skill
@@ -90,7 +93,6 @@ def _said(alone: Mapping[Any, Any], folder: Path, lines: Sequence[str], copied: 
         row.pop("skill", None)
     missing, mixed, good = not_run_sentence(folder), why_not_pooled(folder), alone["frames_ok"]
     failed = good < alone["frames"]
-    closed = gates_in(folder)["closed"]
     why = {"cases missing": missing, "frames failed": failed, "not pooled": mixed, "gate closed": closed}
     status = first_that_holds(why)
     off_scans = [text for text in doubt_in(folder).warnings if OFF_THE_SCANS in text]

@@ -14,6 +14,7 @@ import pytest
 from numpy.typing import NDArray
 
 from pipeline.cli import main
+from pipeline.run.aggregate import aggregate
 from pipeline.run.overall import found_cases, overall, ratio
 from pipeline.run.simulators import OF_SKILL, Piece, _as_far, _rows, side_by_side, write_comparison
 from pipeline.run.stages import others
@@ -505,6 +506,17 @@ def test_wires_that_were_made_from_the_traces_are_not_ok(tmp_path: Path) -> None
         page = own.read_text(encoding="utf-8")
         assert '<span class="status bad">made from the traces</span>' in page, "its own pages were green"
         assert "(rms) from the traced one" not in page
+
+
+def test_a_closed_gate_names_a_page_from_where_it_is_read(tmp_path: Path) -> None:
+    """On the page of all the place was relative to each simulator's own folder: that of the first one's page."""
+    theirs, ours = write_tree(tmp_path, even(0.3)), write_tree(tmp_path / "simulators" / "wireval", even(0.2))
+    write_comparison(tmp_path, {"another": theirs, "wireval": ours})
+    found = aggregate(ours, {"fail_if": ["rms_mm>0.1"]})
+    assert found.closed[0].endswith(f"), {ours.as_posix()}/cases/c5/report.html")
+    page = render_simulators(tmp_path).read_text(encoding="utf-8")
+    assert "), simulators/wireval/cases/c5/report.html.</p>" in page
+    assert "), cases/c5/report.html.</p>" in render_index(ours).read_text(encoding="utf-8")
 
 
 def test_insertions_that_look_like_one_have_no_green_badge(tmp_path: Path) -> None:
