@@ -21,7 +21,7 @@ def gates_in(out_dir: Path, top: Path | None = None) -> dict[str, Sequence[str]]
     top : the folder that pages are named from; by default ``out_dir`` itself.
     """
     told, folder = read_json(out_dir / GATES), out_dir.relative_to(top or out_dir)
-    pages = told.get("pages", {})
+    pages = told.get("worst_pages", {})
     closed = [with_page(why, pages.get(why, ""), folder) for why in told.get("closed", ())]
     return {"closed": closed, "open": told.get("open", ())}
 

@@ -175,7 +175,7 @@ def _judged(
             told[one.asked] += worst
             pages[told[one.asked]] = page
         opened += [] if why else [one.open(overall)]
-    write_json(out / GATES, {"closed": [why for why in told.values() if why], "pages": pages, "open": opened})
+    write_json(out / GATES, {"closed": [why for why in told.values() if why], "worst_pages": pages, "open": opened})
     return {asked: with_page(why, pages.get(why, ""), out) for asked, why in told.items()}, opened
 
 
