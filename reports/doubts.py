@@ -21,6 +21,8 @@ OFF_THE_SCANS = "own curves are not where the scans show the wire"
 Mirrored ones were met within 0.055 mm after their own advice, to fit the roll, while they lay 0.7 mm off the scans."""
 IN_ONE_LINE = "mm in one line"
 """What a warning of a wire of two points says, which shows no roll."""
+OF_THEIR_RUN = "in the run that made these wires: "
+"""How a warning begins that a score has from the run whose wires it scores."""
 AGAINST_INPUTS = (
     " from the traced one, as stated ", " insertion_mm states", " in entry_direction as stated", "the given lumen lies "
 )  # fmt: skip

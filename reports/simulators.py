@@ -11,7 +11,17 @@ import pandas as pd
 from reports import _content
 from reports.alike import alike
 from reports.case_files import counted, listed, not_reached, not_run_sentence
-from reports.doubts import IN_ONE_LINE, OFF_THE_SCANS, Doubt, copied_from_traces, doubt_in, doubted, twins, warnings_in
+from reports.doubts import (
+    IN_ONE_LINE,
+    OF_THEIR_RUN,
+    OFF_THE_SCANS,
+    Doubt,
+    copied_from_traces,
+    doubt_in,
+    doubted,
+    twins,
+    warnings_in,
+)
 from reports.figures.simulators import SimulatorFiles, leads
 from reports.gates import gates_in
 from reports.origin import why_not_pooled
@@ -143,7 +153,12 @@ def _which(row: Mapping[str, Any]) -> str:
 
 def _not_ours(warnings: Mapping[str, list[str]], ours: Mapping[str, list[str]]) -> list[str]:
     """Warnings, by case, that the same scans do not give with our wires, a line each."""
-    return [f"{case}: {text}" for case, said in warnings.items() for text in said if text not in ours.get(case, ())]
+    return [
+        f"{case}: {text}"
+        for case, said in warnings.items()
+        for text in said
+        if text.removeprefix(OF_THEIR_RUN) not in ours.get(case, ())
+    ]
 
 
 def _one_table(rows: pd.DataFrame, copied: Container[str]) -> tuple[pd.DataFrame, list[Column]]:

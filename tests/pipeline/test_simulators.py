@@ -21,10 +21,10 @@ from pipeline.run.stages import others
 from pipeline.run.stages.known import Known
 from reports import tables
 from reports.case_page import render_case
-from reports.doubts import AMONG, COUNT_AS, MADE_FROM_TRACES, Doubt
+from reports.doubts import AMONG, COUNT_AS, MADE_FROM_TRACES, OF_THEIR_RUN, Doubt
 from reports.run_page import render_index
 from reports.schema import ERRORS, FAILURES, POINTS, SIMULATORS, SUMMARY, WHERE
-from reports.simulators import _where, in_common, nearer, render_simulators
+from reports.simulators import _not_ours, _where, in_common, nearer, render_simulators
 from reports.verdict import remarks, verdict
 
 pytestmark = pytest.mark.usefixtures("invented")
@@ -517,6 +517,12 @@ def test_a_closed_gate_names_a_page_from_where_it_is_read(tmp_path: Path) -> Non
     page = render_simulators(tmp_path).read_text(encoding="utf-8")
     assert "), simulators/wireval/cases/c5/report.html.</p>" in page
     assert "), cases/c5/report.html.</p>" in render_index(ours).read_text(encoding="utf-8")
+
+
+def test_a_warning_from_the_run_of_the_wires_is_none_where_our_wires_have_it() -> None:
+    """It began with the run that it is from, and so stood on the page as if theirs alone."""
+    theirs = {"a": [f"{OF_THEIR_RUN}turned by 9 degrees", f"{OF_THEIR_RUN}kinked", "faint"]}
+    assert _not_ours(theirs, {"a": ["turned by 9 degrees", "faint"]}) == [f"a: {OF_THEIR_RUN}kinked"]
 
 
 def test_insertions_that_look_like_one_have_no_green_badge(tmp_path: Path) -> None:
