@@ -19,10 +19,11 @@ from pipeline.run.results import found_results
 from reports import tables
 from reports.case_files import listed
 from reports.doubts import copied_from_traces, warnings_in
+from reports.nearer import SAME, beside, nearer
 from reports.origin import why_not_pooled
 from reports.run_page import render_index
 from reports.schema import FAILURES, OURS, POINTS, SIMULATORS, WHERE
-from reports.simulators import SAME, beside, in_common, nearer, render_simulators
+from reports.simulators import in_common, render_simulators
 from reports.tips import tips_off
 from reports.verdict import COPIED, TIPS_OFF
 

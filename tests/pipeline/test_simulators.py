@@ -22,9 +22,10 @@ from pipeline.run.stages.known import Known
 from reports import tables
 from reports.case_page import render_case
 from reports.doubts import AMONG, COUNT_AS, MADE_FROM_TRACES, OF_THEIR_RUN, Doubt
+from reports.nearer import nearer
 from reports.run_page import render_index
 from reports.schema import ERRORS, FAILURES, POINTS, SIMULATORS, SUMMARY, WHERE
-from reports.simulators import _not_ours, _where, in_common, nearer, render_simulators
+from reports.simulators import _not_ours, _where, in_common, render_simulators
 from reports.verdict import remarks, verdict
 
 pytestmark = pytest.mark.usefixtures("invented")
