@@ -85,7 +85,8 @@ def of_drift(curves: Mapping[int, Curve], since: Since = FIRST) -> list[str]:
     if not moved:
         return []
     worst = max(moved, key=lambda n: moved[n])
+    where = f" (frame {worst})" * (len(moved) > 1)
     return [
-        f"{frames_named([*moved])}: the phantom moved since {since.scan}, by {moved[worst]:.1f} voxels (frame {worst}),"
+        f"{frames_named([*moved])}: the phantom moved since {since.scan}, by {moved[worst]:.1f} voxels{where},"
         f" and {since.why}: lumen and entry are those of {since.scan}, traces lie off by as much; {since.do}"
     ]

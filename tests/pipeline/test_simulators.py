@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pipeline.cli import main
 from pipeline.run.aggregate import aggregate
 from pipeline.run.overall import found_cases, overall, ratio
-from pipeline.run.simulators import OF_SKILL, Piece, _as_far, _rows, side_by_side, write_comparison
+from pipeline.run.simulators import OF_SKILL, Piece, _alike, _as_far, _rows, side_by_side, write_comparison
 from pipeline.run.stages import others
 from pipeline.run.stages.known import Known
 from reports import tables
@@ -417,6 +417,7 @@ def test_the_same_twice_is_a_tie(tmp_path: Path) -> None:
     said = write_comparison(tmp_path, both)
     assert set(pd.read_csv(tmp_path / "where.csv")["lead"].dropna()) == {"tie"}
     assert said[0] == "another and wireval have the same error at every point of all 24 frames: is one a copy?"
+    assert _alike({"a": [], "b": []}) == [], "of no frames nobody is a copy"
 
 
 def test_the_page(compared: Path) -> None:
