@@ -38,6 +38,16 @@ def number(value: Any, digits: int = 3) -> str:
     return f"{value:.{max(digits - 1 - exponent, 0)}f}"
 
 
+def length(value: Any) -> str:
+    """A number of mm; one below a nanometre is rounding, and was 2.35e-16 mm."""
+    return "0" if isinstance(value, float) and abs(value) < 1e-6 else number(value)
+
+
+def _shown(value: Any, column: Column) -> str:
+    """A value of a column in words."""
+    return length(value) if column.unit == "mm" else number(value)
+
+
 _IF = re.compile(r"\{([^|{}]+)\|([^{}]*)\}")
 
 
@@ -102,7 +112,7 @@ def cards(entries: Iterable[Mapping[str, str]], statistics: Mapping[str, Any]) -
     shown = []
     for entry in entries:
         name = entry["column"].format_map(defaultdict(str, statistics))
-        value = number(statistics.get(name)) if name in SUMMARY.names else NOTHING
+        value = _shown(statistics.get(name), SUMMARY[name]) if name in SUMMARY.names else NOTHING
         if value != NOTHING:
             column = SUMMARY[name]
             total = f"of {statistics[entry['of']]} " if entry.get("of") in statistics else ""
@@ -230,7 +240,7 @@ def _head(column: Column) -> dict[str, Any]:
 
 
 def _cell(record: Mapping[Any, Any], column: Column, nothing: str) -> dict[str, Any]:
-    value = number(record[column.name]).replace(NOTHING, nothing)
+    value = _shown(record[column.name], column).replace(NOTHING, nothing)
     return {"value": value, "detail": _interval(record, column), "text": column.kind == "text", "link": ""}
 
 

@@ -19,8 +19,10 @@ OFF_THE_SCANS = "own curves are not where the scans show the wire"
 """What a warning of the user's own traces says that lie off the wires in the scans: every error is from these traces.
 
 Mirrored ones were met within 0.055 mm after their own advice, to fit the roll, while they lay 0.7 mm off the scans."""
-IN_ONE_LINE = "mm in one line"
-"""What a warning of a wire of two points says, which shows no roll."""
+MOSTLY_LINES = "most frames are one line"
+"""What a warning says where more than half of a case's wires are of two points, which show no roll."""
+OF_THEIR_RUN = "in the run that made these wires: "
+"""How a warning begins that a score has from the run whose wires it scores."""
 AGAINST_INPUTS = (
     " from the traced one, as stated ", " insertion_mm states", " in entry_direction as stated", "the given lumen lies "
 )  # fmt: skip
@@ -48,8 +50,8 @@ class Doubt(NamedTuple):
 
     @property
     def shows_no_roll(self) -> bool:
-        """Whether traces lie off the wires that the scans show, or a wire is one line: no roll is told from these."""
-        return any(words in text for text in self.warnings for words in (OFF_THE_SCANS, IN_ONE_LINE))
+        """Whether traces lie off the wires that the scans show, or most wires are one line: neither shows a roll."""
+        return any(words in text for text in self.warnings for words in (OFF_THE_SCANS, MOSTLY_LINES))
 
 
 NO_DOUBT = Doubt()

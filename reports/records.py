@@ -15,8 +15,9 @@ HELD: dict[str, tuple[type[Any], ...]] = {
     "config": (dict, dict, dict), "provenance": (dict,), "summary": (dict,), "counters": (dict,), "entry": (dict,),
     "chosen": (dict,), "inputs": (list, dict), "failures": (list, dict), "frames": (list, dict), "sweep": (list, dict),
     "planned": (list, str), "left_out": (list, str), "swept": (list, str), "warnings": (list, str),
+    "warnings_of_wires": (list, str),
     "assumptions": (list, str), "argv": (list, str), "doubts": (list, str), "fail_if": (list, str),
-    "closed": (list, str), "open": (list, str), "own": (dict, str),
+    "closed": (list, str), "open": (list, str), "worst_pages": (dict, str), "own": (dict, str),
 }  # fmt: skip
 """What their keys hold: an object or a list, and what this consists of."""
 ALWAYS = ("result.json", "errors.csv", "frames.h5", "timings.csv", "provenance.json")

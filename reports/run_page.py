@@ -172,7 +172,7 @@ def _judged(
     """Badge, verdict and warnings over all cases. row : of overall.csv.     why_none : why there may be no verdict."""
     doubt = doubt_of(out_dir, {case.name: case.result for case in cases})
     said, more = headline(row, _simulator(cases), doubt)
-    told = {"verdict": said or why_none, "more": [*more, *filter(None, [of_these_alone(row)])]}
+    told = {"verdict": said or why_none, "more": [*more, *filter(None, [not doubt.copied and of_these_alone(row)])]}
     return told | {"badge": badge(status, status == "ok", row, doubt), "warnings": doubt.warnings}
 
 

@@ -1,6 +1,5 @@
 """The page of several simulators side by side, from simulators.csv and where.csv."""
 
-import math
 from collections.abc import Container, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -11,9 +10,20 @@ import pandas as pd
 from reports import _content
 from reports.alike import alike
 from reports.case_files import counted, listed, not_reached, not_run_sentence
-from reports.doubts import IN_ONE_LINE, OFF_THE_SCANS, Doubt, copied_from_traces, doubt_in, doubted, twins, warnings_in
+from reports.doubts import (
+    MOSTLY_LINES,
+    OF_THEIR_RUN,
+    OFF_THE_SCANS,
+    Doubt,
+    copied_from_traces,
+    doubt_in,
+    doubted,
+    twins,
+    warnings_in,
+)
 from reports.figures.simulators import SimulatorFiles, leads
 from reports.gates import gates_in
+from reports.nearer import farther_mm, nearer
 from reports.origin import why_not_pooled
 from reports.page import draw_sections, write_page
 from reports.schema import FAILURES, OURS, OVERALL_FILE, SIMULATORS, SUMMARY, WHERE, Column
@@ -23,8 +33,6 @@ from reports.verdict import NEVER_NEAREST, badge, first_that_holds, headline, me
 
 PAGE = "simulators.html"
 _MOST_WARNINGS, _MOST_REASONS = 5, 3
-SAME = "the same error at every point"
-"""What the note of a pair of simulators says that cannot be told apart."""
 _MOST_SHARED = 0.75
 """Share of a simulator's frames up to which those that count for all of them are few."""
 
@@ -44,9 +52,10 @@ def render_simulators(out_dir: Path, embed: bool = False) -> Path:
     alien = {name: _not_ours(own, warnings.get(OURS, {})) for name, own in warnings.items()}
     alone = {str(row["simulator"]): row for row in table.to_dict("records")}
     few = set(_with_few(table)["simulator"])
+    closed = {name: gates_in(folder, out_dir)["closed"] for name, folder in folders.items()}
     told = [
         {"name": name, "link": links[name]}
-        | _said(alone[name], folder, alien[name], copied.get(name, ""), few=name in few)
+        | _said(alone[name], folder, alien[name], copied.get(name, ""), closed[name], few=name in few)
         for name, folder in folders.items()
     ]
     page = {
@@ -76,7 +85,9 @@ def folders_in(out_dir: Path) -> dict[str, Path]:
     return {name: out_dir / "simulators" / name if number else out_dir for number, name in enumerate(names)}
 
 
-def _said(alone: Mapping[Any, Any], folder: Path, lines: Sequence[str], copied: str, *, few: bool) -> dict[str, Any]:
+def _said(
+    alone: Mapping[Any, Any], folder: Path, lines: Sequence[str], copied: str, closed: Sequence[str], *, few: bool
+) -> dict[str, Any]:
     """Badge and verdict of a simulator, and warnings of its cases: these ``lines``.
 
     alone : its row of simulators.csv, which counts its frames also where nothing is pooled over them, and whose skill
@@ -90,22 +101,23 @@ def _said(alone: Mapping[Any, Any], folder: Path, lines: Sequence[str], copied: 
         row.pop("skill", None)
     missing, mixed, good = not_run_sentence(folder), why_not_pooled(folder), alone["frames_ok"]
     failed = good < alone["frames"]
-    closed = gates_in(folder)["closed"]
     why = {"cases missing": missing, "frames failed": failed, "not pooled": mixed, "gate closed": closed}
     status = first_that_holds(why)
     off_scans = [text for text in doubt_in(folder).warnings if OFF_THE_SCANS in text]
-    in_line = [line for line in lines if IN_ONE_LINE in line]
+    in_line = [line for line in lines if MOSTLY_LINES in line]
     doubt = Doubt("" if missing or failed or mixed else copied, twins(doubted(folder)), [*off_scans, *in_line])
     said, more = headline(row, alone["simulator"], doubt, defined=False)
+    rival = row.get("strongest_null") if said and not doubt.copied else None
     lines = [line for line in lines if line not in (doubt.copied, *off_scans)]
     said = said or mixed or not_reached(folder) or "No frame of it has a result." * (not good)
-    more += filter(None, [_without_others(*alone_skill, row), f"Of the study {missing}." * bool(missing)])
+    beside = "" if doubt.copied else _without_others(*alone_skill, row)
+    more += filter(None, [beside, f"Of the study {missing}." * bool(missing)])
     rest = len(lines) - _MOST_WARNINGS
     return {
         "badge": badge(status, status == "ok", row, doubt),
         "verdict": said,
         "more": more,
-        "rival": str(row.get("strongest_null")) if said and pd.notna(row.get("strongest_null")) else "",
+        "rival": str(rival) if pd.notna(rival) else "",
         "closed": closed,
         "failures": _failed(folder, alone["simulator"]) if failed else [],
         "warnings": [
@@ -141,7 +153,12 @@ def _which(row: Mapping[str, Any]) -> str:
 
 def _not_ours(warnings: Mapping[str, list[str]], ours: Mapping[str, list[str]]) -> list[str]:
     """Warnings, by case, that the same scans do not give with our wires, a line each."""
-    return [f"{case}: {text}" for case, said in warnings.items() for text in said if text not in ours.get(case, ())]
+    return [
+        f"{case}: {text}"
+        for case, said in warnings.items()
+        for text in said
+        if text.removeprefix(OF_THEIR_RUN) not in ours.get(case, ())
+    ]
 
 
 def _one_table(rows: pd.DataFrame, copied: Container[str]) -> tuple[pd.DataFrame, list[Column]]:
@@ -151,7 +168,7 @@ def _one_table(rows: pd.DataFrame, copied: Container[str]) -> tuple[pd.DataFrame
     failed frames, which neither counts, tips that rms_mm does not see, or wires made from the traces. copied : these.
     """
     table = rows[rows["against"].isna()]
-    table = table.assign(doubtful=_doubtful(table, copied), far=[_farther_mm(row) for row in table.to_dict("records")])
+    table = table.assign(doubtful=_doubtful(table, copied), far=[farther_mm(row) for row in table.to_dict("records")])
     table = table.sort_values(["doubtful", "far"], kind="stable")
     table = table.drop(columns=["doubtful", "far"]).reset_index(drop=True)
     columns = _content.quoted_first(SIMULATORS.shown("cases"))
@@ -175,69 +192,6 @@ def _off(table: pd.DataFrame, copied: Container[str]) -> set[str]:
 def _doubtful(table: pd.DataFrame, copied: Container[str]) -> "pd.Series[bool]":
     """Whether a simulator has failed frames, tips that rms_mm does not see, or wires made from the traces."""
     return table["frames_ok"].lt(table["frames"]) | table["simulator"].isin(_off(table, copied))
-
-
-def _farther_mm(row: Mapping[Any, Any]) -> float:
-    """The larger of a simulator's rms distances to the traced wires and from them."""
-    return max((float(row[name]) for name in ("rms_mm", "back_rms_mm") if pd.notna(row.get(name))), default=math.inf)
-
-
-def nearer(rows: Sequence[Mapping[Any, Any]], off: Container[str] = ()) -> list[str]:
-    """Of the simulator with the least error how it stands to every other one, a sentence each.
-
-    The error is the larger of the two ways. One with failed frames, which it leaves out, is held against one without.
-    rows : of simulators.csv.     off : simulators that are left out, since rms_mm does not judge them.
-    """
-    own = [row for row in rows if pd.isna(row.get("against")) and row["simulator"] not in off and row["frames_ok"] > 0]
-    if not own:
-        return []
-    best = min(own, key=lambda row: (row["frames_ok"] < row["frames"], _farther_mm(row)))["simulator"]
-    others = [row["simulator"] for row in own]
-    pairs = [row for row in rows if row["simulator"] in others and row.get("against") in others]
-    of_best = [row for row in pairs if row["against"] == best]
-    alike = [row for row in pairs if best not in (row["simulator"], row["against"]) and SAME in str(row["interval"])]
-    once = [row for row in alike if others.index(row["against"]) < others.index(row["simulator"])]
-    return [beside(row) for row in (*of_best, *once)]
-
-
-def beside(row: Mapping[Any, Any]) -> str:
-    """Whether the simulator of a row is farther from the traced wires than that of ``against``: both ways, or not."""
-    one, other = row["simulator"], row["against"]
-    if SAME in str(row["interval"]):
-        return f"{one} and {other} have {SAME} of all {counted(int(row['common_frames']), 'frame')}: is one a copy?"
-    (value, low, high), back = (_with_ends(row, name) for name in ("rms_ratio", "back_ratio"))
-    farther = low > 1.0 and (math.isnan(back[0]) or back[1] > 1.0)
-    closer = high < 1.0 and (math.isnan(back[0]) or back[2] < 1.0)
-    head = f"{other} is nearer than {one}" if farther else f"{one} is nearer than {other}" if closer else ""
-    head = head or f"{other} is not shown to be nearer than {one}"
-    one_way = (low > 1.0 or high < 1.0) and not (farther or closer)
-    known = "; ".join(filter(None, ("rms_ratio" * one_way, _interval(low, high), str(row["interval"]))))
-    where = counted(int(row["common_frames"]), "frame")
-    said = f"{head}: on {where} {one} lies {value:.2f} times as far from the traced wires ({known})"
-    return said + (_the_other_way(one, other, value, back) if one_way else ".")
-
-
-def _the_other_way(one: str, other: str, value: float, back: tuple[float, float, float]) -> str:
-    """The end of a sentence of which the ratio ``value`` of rms_mm is told, and that of back_rms_mm does not bear out.
-
-    Of two that lie to either side of 1 the one that is nearer by rms_mm may owe it to what its wires leave out.
-    """
-    early = one if value < 1.0 < back[0] else other if back[0] < 1.0 < value else ""
-    told = "; ".join(filter(None, ("back_ratio", _interval(*back[1:]))))
-    said = f", {'but' if early else 'and'} the traced wires lie {back[0]:.2f} times as far from {one} ({told})"
-    return said + (f": does {early} end early?" if early else ".")
-
-
-def _interval(low: float, high: float) -> str:
-    """An interval in words; empty where it has no two ends."""
-    return f"95 % interval {low:.2f} to {high:.2f}" if low <= high else ""
-
-
-def _with_ends(row: Mapping[Any, Any], name: str) -> tuple[float, float, float]:
-    """A ratio and the ends of its interval; NaN for what is empty."""
-    values = (row.get(name + end) for end in ("", "_low", "_high"))
-    value, low, high = (math.nan if pd.isna(one) else float(one) for one in values)
-    return value, low, high
 
 
 def in_common(rows: pd.DataFrame) -> str:

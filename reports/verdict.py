@@ -5,13 +5,14 @@ from collections.abc import Iterator, Mapping
 from math import inf, isnan, nan
 from typing import Any
 
-from reports._content import NOTHING, fewer_frames, interval, number, predictor_label, value_of
+from reports._content import NOTHING, fewer_frames, interval, length, number, predictor_label, value_of
 from reports.case_files import counted
 from reports.doubts import NO_DOUBT, Doubt
 from reports.schema import OURS, SUMMARY
 from reports.tips import tips_off
 
 _LISTS = re.compile(r" \([^()]*\b(?:frame|case)s? [^()]*\)")  # frame after frame, which the warning itself has
+_WITHHELD = re.compile(r"withheld: (\d+) insertion")
 _WIDE = "wide: "  # how the note on an interval over few insertions begins
 
 
@@ -33,7 +34,7 @@ def headline(
     """
     said = list(_sentences(statistics, simulator, doubt, defined=False))
     more, rival = [text for text, first in said if not first], statistics.get("strongest_null")
-    if defined and said and number(statistics.get("skill_strongest")) != NOTHING:
+    if defined and said and not doubt.copied and number(statistics.get("skill_strongest")) != NOTHING:
         more.append(f"The predictor {predictor_label(str(rival))!r} is {meaning_of_rival(str(rival))}.")
     return " ".join(text for text, first in said if first), more
 
@@ -45,20 +46,21 @@ def _sentences(
     if doubt.copied:
         yield f"{doubt.copied}.", True
         return
-    rms, true = (_mm(statistics.get(key)) for key in ("rms_mm", "truth_rms_mm"))
+    rms, true = (length(statistics.get(key)) for key in ("rms_mm", "truth_rms_mm"))
     if rms == NOTHING:
         return
-    against, *weaker = _against(statistics, defined=defined)
+    against, few, weaker = _against(statistics, defined=defined)
     again = f"But {TWINS} that was scanned again, and count as several: see the warnings." * bool(doubt.twins)
     said = [
         (_far(statistics, simulator, rms), True),
         (f"From the true wire it lies {true} mm." * (true != NOTHING), True),
         (_at_the_floor(statistics), False),
-        (_beyond_inputs(statistics), False),
+        (_beyond_inputs(statistics), True),
         (_warned(doubt), True),
         (tips_off(statistics), True),
         (against, True),
-        *((text, False) for text in weaker),
+        (weaker, True),
+        (few, False),
         (_unknown_roll(statistics, simulator, doubt), True),
         (again, True),
     ]
@@ -73,13 +75,8 @@ def _far(statistics: Mapping[str, Any], simulator: str, rms: str) -> str:
     sentence = f"{f'On {some} alone t' if some else 'T'}{whose} lies {rms} mm (rms) from the traced one"
     few = _over_few(statistics)
     sentence += f", 95 % interval {ends} mm" + f" (wide: {few})" * bool(few) if ends else ""
-    tail = _mm(statistics.get("p95_mm"))
+    tail = length(statistics.get("p95_mm"))
     return sentence + (f"; 95 % of its points lie within {tail} mm." if tail != NOTHING else ".")
-
-
-def _mm(value: Any) -> str:
-    """A length in words; one below a nanometre is rounding, and was 2.35e-16 mm."""
-    return "0" if abs(value_of(value)) < 1e-6 else number(value)
 
 
 def _warned(doubt: Doubt) -> str:
@@ -226,11 +223,13 @@ def in_short(statistics: Mapping[str, Any]) -> str:
     return said.get(standing(statistics), f"{value} against {rival}")
 
 
-def _against(statistics: Mapping[str, Any], *, defined: bool) -> list[str]:
-    """Whether the skill, and its interval where there is one, is above zero; what else to know where frames failed."""
+def _against(statistics: Mapping[str, Any], *, defined: bool) -> tuple[str, str, str]:
+    """Whether the skill, and its interval where there is one, is above zero; whose doing a wide interval is; and what
+    else to know where frames failed.
+    """
     rival, skill, least, _ = _skill(statistics)
     if not rival:
-        return [""]
+        return "", "", ""
     if not defined and number(statistics.get("skill_strongest")) != NOTHING:
         rival = f"the predictor {predictor_label(str(statistics.get('strongest_null')))!r}"
     value = " ".join(filter(None, (f"skill {_at_least(skill, number(skill))}", fewer_frames(statistics))))
@@ -245,7 +244,7 @@ def _against(statistics: Mapping[str, Any], *, defined: bool) -> list[str]:
     how = said.get(standing(statistics), f"The wire is better ({value})")
     few = _few_insertions(statistics) if least <= 0.0 < skill else ""
     how, weaker = (f"On these frames {how[0].lower()}{how[1:]}", _WEAKER) if _of_frames(statistics) else (how, "")
-    return [f"{how} than {rival}.", few, weaker]
+    return f"{how} than {rival}.", few, weaker
 
 
 # a lost half of an insertion took the partner of "another insertion": 0.926 instead of 0.563
@@ -268,9 +267,11 @@ def _over_few(statistics: Mapping[str, Any]) -> str:
 
 def of_these_alone(statistics: Mapping[str, Any]) -> str:
     """That a skill without an interval is only about the insertions at hand: three give a wide one."""
-    withheld = "withheld" in str(statistics.get("interval")) and _skill(statistics)[1] > 0.0
-    alone = "The skill tells of these insertions alone: an interval takes three of them, or better six."
-    return alone * withheld
+    found = _WITHHELD.search(str(statistics.get("interval")))
+    if not found or not _skill(statistics)[1] > 0.0:
+        return ""
+    who = "One insertion says" if found[1] == "1" else f"{found[1]} insertions say"
+    return f"{who} nothing about others: scan three for an interval, six for a narrow one."
 
 
 def _of_frames(statistics: Mapping[str, Any]) -> str:

@@ -1,11 +1,11 @@
-"""``wireval check MANIFEST``: every problem at once, headers only."""
+"""``wireval check MANIFEST``: every problem at once, before anything is computed."""
 
 import argparse
 
 from pipeline.commands import add_settings, resolved_settings, say
 from pipeline.commands.given import add_manifest, assumed_in, given
 
-HELP = "list every problem of a manifest at once; reads of scans the headers alone"
+HELP = "list every problem of a manifest at once; reads only the headers of scans, and a given lumen whole"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -132,16 +132,20 @@ def _refused_beside(wires: Path) -> dict[int, tuple[str, ...]]:
 
 
 def warned_beside(files: Sequence[Source]) -> list[str]:
-    """What the run that wrote these wires was warned of; nothing for wires of another origin."""
-    return list(_beside(files[0].path).get("warnings", ())) if len(files) == 1 else []
+    """What the run that wrote these wires was warned of them; nothing for wires of another origin."""
+    return list(_beside(files[0].path).get("warnings_of_wires", ())) if len(files) == 1 else []
+
+
+def result_beside(files: Sequence[Source]) -> Path | None:
+    """Where the result of the run lies that wrote these wires, from which statuses and warnings are taken."""
+    return files[0].path.with_name("result.json") if len(files) == 1 and files[0].path.name == "frames.h5" else None
 
 
 def _beside(wires: Path) -> dict[str, Any]:
     """The result of the run that wrote these wires; empty for any other file."""
-    if wires.name != "frames.h5":
-        return {}
+    path = result_beside([Source(wires)])
     try:
-        return read_result(wires.with_name("result.json"))
+        return {} if path is None else read_result(path)
     except UnreadableError as error:
         raise LoadError(str(error)) from None
 

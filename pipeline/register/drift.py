@@ -85,7 +85,8 @@ def of_drift(curves: Mapping[int, Curve], earlier: EarlierScan = FIRST) -> list[
     if not moved:
         return []
     worst = max(moved, key=lambda n: moved[n])
+    where = f" (frame {worst})" * (len(moved) > 1)
     return [
-        f"{frames_named([*moved])}: the phantom moved since {earlier.name}, by {moved[worst]:.1f} voxels (frame {worst}"
-        f"), and {earlier.why}: lumen and entry are those of {earlier.name}, traces lie off by as much; {earlier.do}"
+        f"{frames_named([*moved])}: the phantom moved since {earlier.name}, by {moved[worst]:.1f} voxels{where},"
+        f" and {earlier.why}: lumen and entry are those of {earlier.name}, traces lie off by as much; {earlier.do}"
     ]

@@ -22,7 +22,7 @@ from pipeline.status import UsageError
 from reports import tables
 from reports.case_files import GOOD, not_reached, not_run, planned_frames
 from reports.doubts import AMONG, copied_from_traces, doubt_in, doubted, warnings_in
-from reports.gates import GATES, asked_of
+from reports.gates import GATES, asked_of, with_page
 from reports.junit import Outcome, write_junit
 from reports.origin import why_not_pooled
 from reports.schema import ERRORS, FAILURES, OVERALL_FILE, SUMMARY, TIMINGS
@@ -150,9 +150,6 @@ def _keep_what_is_seen(out: Path, found: Sequence[Result], among: Sequence[Found
         write_json(out / AMONG, {"assumptions": assumed, "doubts": doubts})
 
 
-PLACE = "cases/"
-
-
 def _judged(
     out: Path, asked: Sequence[str], overall: Mapping[str, Any], scored: Sequence[Found]
 ) -> tuple[dict[str, str], list[str]]:
@@ -165,7 +162,7 @@ def _judged(
     if not asked:
         return {}, []
     copied = copied_from_traces(warnings_in(out))  # reads the results of all cases
-    told, opened = {}, []
+    told, pages, opened = {}, {}, []
     for text in asked:
         try:
             one = parsed(text)
@@ -174,27 +171,28 @@ def _judged(
             continue
         told[one.asked] = why = f"{CLOSED}: {one.asked}: {copied}" if copied else one.closed(overall)
         if why and not copied and pd.notna(overall.get(one.column)):
-            told[one.asked] += _worst(scored, one.column)
+            worst, page = _worst(scored, one.column)
+            told[one.asked] += worst
+            pages[told[one.asked]] = page
         opened += [] if why else [one.open(overall)]
-    write_json(out / GATES, {"closed": [why for why in told.values() if why], "open": opened})
-    # on its own page a place is relative to that; on the terminal to where the command ran
-    return {asked: why.replace(f" {PLACE}", f" {out.as_posix()}/{PLACE}") for asked, why in told.items()}, opened
+    write_json(out / GATES, {"closed": [why for why in told.values() if why], "worst_pages": pages, "open": opened})
+    return {asked: with_page(why, pages.get(why, ""), out) for asked, why in told.items()}, opened
 
 
-def _worst(scored: Sequence[Found], column: str) -> str:
-    """Which frame is the worst by a column of overall.csv, and its page; empty for what no frame has."""
+def _worst(scored: Sequence[Found], column: str) -> tuple[str, str]:
+    """Which frame is the worst by a column of overall.csv, and its page below OUT; empty for what no frame has."""
     name = column.replace("_median", "")
     if name not in ERRORS.names or not ERRORS[name].better:
-        return ""
+        return "", ""
     sign = -1.0 if ERRORS[name].better == "high" else 1.0
     of_all: list[tuple[str, int, Any]] = [
         (case.result.case, n, frame.row.get(name)) for case in scored for n, frame in case.frames.items()
     ]
     known = [(case, n, float(value)) for case, n, value in of_all if pd.notna(value)]
     if not known:
-        return ""
+        return "", ""
     case, frame, value = max(known, key=lambda row: sign * row[2])
-    return f"; the worst: case {case} frame {frame} ({name} {value:.4g}), {PLACE}{case}/report.html"
+    return f"; the worst: case {case} frame {frame} ({name} {value:.4g})", f"cases/{case}/report.html"
 
 
 def _times(out: Path, found: Sequence[Result]) -> tuple[pd.DataFrame, float]:

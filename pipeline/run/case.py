@@ -10,6 +10,7 @@ from time import perf_counter
 from typing import Any
 
 import solver
+from pipeline.load.wires import result_beside
 from pipeline.run import ledger, outputs, results
 from pipeline.run.cache import Store
 from pipeline.run.hashing import hashing
@@ -73,7 +74,8 @@ class Job:
         code = (package_version(), hash_of(Path(__file__)), versions(COMPUTING))
         given = self.settings.calibrated and self.settings.calibrated[0]
         named = (self.simulator,) if self.simulator else ()  # the page names the simulator
-        return digest((self.case, self.settings.config, given, self.until, code, ERRORS.columns, *named))
+        beside = None if self.case.simulated is None else result_beside(self.case.simulated.files)
+        return digest((self.case, self.settings.config, given, self.until, code, ERRORS.columns, beside, *named))
 
 
 def clear(folder: Path) -> str:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from pipeline.load import Source, parts_of
+from pipeline.load.wires import result_beside
 from pipeline.run.hashing import file_hash
 from pipeline.status import FrameStatus, StageError
 from pipeline.study.manifest import Case
@@ -112,8 +113,13 @@ def described(case: Case) -> list[dict[str, Any]]:
 
 
 def named_files(case: Case) -> dict[str, Path]:
-    """Input files by key: the case's own, another simulator's wires, and those of the case whose clamp it borrows."""
+    """Input files by key: the case's own, another simulator's wires, and those of the case whose clamp it borrows.
+
+    Beside wires of a run its result, from which their statuses and warnings are.
+    """
     others = {} if case.simulated is None else files_of(case.simulated, "simulated.")
+    if case.simulated is not None and (result := result_beside(case.simulated.files)):
+        others["simulated.result"] = result
     return files_of(case) | others | ({} if case.entry_case is None else files_of(case.entry_case, "entry."))
 
 

@@ -27,6 +27,7 @@ Progress = Callable[[str, int, int, str], None]
 class Log:
     """Times and numbers by stage. seconds : of the whole case; frame_seconds : by (frame, stage).
 
+    of_wires : those of ``warnings`` that concern the simulated wires, which whoever scores these inherits.
     chosen : what was chosen automatically, and why.     reused : number of results by stage that came from the store.
     """
 
@@ -35,6 +36,7 @@ class Log:
     frame_seconds: dict[tuple[int, str], float] = field(default_factory=dict)
     assumptions: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
+    of_wires: list[str] = field(default_factory=list)
     chosen: dict[str, str] = field(default_factory=dict)
     reused: dict[str, int] = field(default_factory=dict)
     _counts: dict[str, dict[str, float]] = field(default_factory=lambda: defaultdict(dict))

@@ -233,6 +233,7 @@ def details_of(case: Case, known: Known, log: Log) -> dict[str, Any]:
     return {
         "assumptions": log.assumptions,
         "warnings": log.warnings,
+        "warnings_of_wires": log.of_wires,
         "wire": case.wire,
         "wall": case.wall,
         "entry": clamp,

@@ -6,6 +6,7 @@ planned frames: a simulator gains nothing by failing in the hard ones.
 """
 
 from collections.abc import Iterator, Mapping, Sequence, Set
+from itertools import combinations
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -19,10 +20,11 @@ from pipeline.run.results import found_results
 from reports import tables
 from reports.case_files import listed
 from reports.doubts import copied_from_traces, warnings_in
+from reports.nearer import SAME, beside, nearer
 from reports.origin import why_not_pooled
 from reports.run_page import render_index
 from reports.schema import FAILURES, OURS, POINTS, SIMULATORS, WHERE
-from reports.simulators import SAME, beside, in_common, nearer, render_simulators
+from reports.simulators import in_common, render_simulators
 from reports.tips import tips_off
 from reports.verdict import COPIED, TIPS_OFF
 
@@ -55,6 +57,7 @@ def write_comparison(out: Path, folders: Mapping[str, Path]) -> list[str]:
     studies = {name: with_another(folder, found_cases(folder)) for name, folder in folders.items()}
     mixed = why_not_pooled(*folders.values())
     pairs = [(one, other) for one in studies for other in studies if one != other and not mixed]
+    alike = _alike(studies)
     common = _common(studies)
     judged = {name: found for name, found in studies.items() if common <= frames_in(found)}
     rows = [_alone(name, found, common, name in judged) for name, found in studies.items()]
@@ -65,7 +68,7 @@ def write_comparison(out: Path, folders: Mapping[str, Path]) -> list[str]:
         both = ratio(studies[other], studies[one])
         if both is not None:
             caveat = _caveat({name for name in (one, other) if off.get(name) == TIPS_OFF})
-            same = _same(studies[one], studies[other])
+            same = {one, other} in alike
             caveat += [SAME] * same
             found = zip(RATIOS, (both.value, both.low, both.high, *both.back), strict=True)
             values = {name: value for name, value in found if name in RATIOS[:3] or np.isfinite(both.back[0])}
@@ -83,12 +86,17 @@ def write_comparison(out: Path, folders: Mapping[str, Path]) -> list[str]:
     return sentences
 
 
-def _same(one: Sequence[Found], other: Sequence[Found]) -> bool:
-    """Whether the errors of two simulators are the same at every point of all frames."""
-    mine, theirs = (
-        {(case.result.case, n): frame.error_mm for case in validation(found) for n, frame in case.frames.items()}
-        for found in (one, other)
-    )
+def _alike(studies: Studies) -> list[set[str]]:
+    """The pairs of simulators whose errors are the same at every point of all frames, of which there are some."""
+    errors = {
+        name: {(case.result.case, n): frame.error_mm for case in validation(found) for n, frame in case.frames.items()}
+        for name, found in studies.items()
+    }
+    pairs = [pair for pair in combinations(errors, 2) if errors[pair[0]] and _same(*map(errors.__getitem__, pair))]
+    return [set(pair) for pair in pairs]
+
+
+def _same(mine: Mapping[Any, Array], theirs: Mapping[Any, Array]) -> bool:
     return mine.keys() == theirs.keys() and all(np.array_equal(mine[n], theirs[n]) for n in mine)
 
 

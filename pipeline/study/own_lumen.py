@@ -1,12 +1,14 @@
 """What is wrong with the user's own lumen before anything is computed: it cannot be read, or lies off the entry."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from pipeline.arrays.grids import corners_mm
-from pipeline.load import Header, LoadError, Source
+from pipeline.load import Header, LoadError, Source, parts_of
 from pipeline.load.lumens import LOOK_AT, meant_within_mm, read_lumen
 from pipeline.load.masks import mask_header
 from pipeline.model import Array, Branches, Shapes, Volume
@@ -18,8 +20,30 @@ MOST_VOXELS = 400**3
 """Voxels of a label map up to which they are read, in half a second; of a larger one the header alone is."""
 
 
-def lumen_problems(case: Case, lumen: Source, least_voxels: int) -> Iterator[str]:
+def lumen_problems(case: Case, lumen: Source, least_voxels: int) -> Sequence[str]:
     """What is wrong with a lumen; in a case that was found by its run alone, all others were computed before."""
+    try:
+        files = [path.stat() for path in (lumen.path, *parts_of(lumen.path)) if path.exists()]
+    except LoadError as error:
+        return [str(error)]
+    states = tuple((file.st_size, file.st_mtime_ns, file.st_ctime_ns, file.st_ino) for file in files)
+    return _problems(_At(tuple(case.entry_mm), case.entry_sigma_mm), lumen, least_voxels, states)
+
+
+class _At(NamedTuple):
+    """What of a case a lumen is held against."""
+
+    entry_mm: tuple[float, ...]
+    entry_sigma_mm: float | None
+
+
+@cache
+def _problems(case: _At, lumen: Source, least_voxels: int, _states: tuple[tuple[int, ...], ...]) -> tuple[str, ...]:
+    """Kept as long as the lumen's files stay as they are: `score` asks for each simulator, half a second each time."""
+    return tuple(_found(case, lumen, least_voxels))
+
+
+def _found(case: _At, lumen: Source, least_voxels: int) -> Iterator[str]:
     try:
         found = _read(lumen, least_voxels)
     except LoadError as error:
@@ -77,7 +101,7 @@ def _any_near(lumen: Volume, point_mm: Array, within_mm: float) -> bool:
     return bool(np.any(np.linalg.norm(lumen.to_mm(near) - point_mm, axis=1) <= within_mm + half))
 
 
-def _entry(case: Case) -> str:
+def _entry(case: _At) -> str:
     return f"entry_mm {list(case.entry_mm)}"
 
 

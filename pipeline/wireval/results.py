@@ -125,7 +125,7 @@ def read_results(out: str | Path) -> Results:
 def _closed(out: Path) -> tuple[str, ...]:
     """A sentence for each closed gate of a run; of a score, of every simulator that was asked."""
     of = {f"{name}: ": folder for name, folder in folders_in(out).items()} or {"": out}
-    return tuple(f"{whose}{why}" for whose, folder in of.items() for why in gates_in(folder)["closed"])
+    return tuple(f"{whose}{why}" for whose, folder in of.items() for why in gates_in(folder, out)["closed"])
 
 
 def _tables_of_others(found: Results, results: Sequence[Result]) -> str:

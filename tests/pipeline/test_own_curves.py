@@ -20,6 +20,7 @@ from pipeline.run.stages.known import Frame
 from pipeline.run.stages.own_curves import CORNER_VOXELS, LONGER, _in_lumen, corner_mm, known_by_tip, rough, zigzag
 from pipeline.status import FrameStatus
 from pipeline.trace.config import TraceConfig
+from reports.doubts import MOSTLY_LINES
 from solver import Grid
 from tests.later import later
 from tests.pipeline.known_study import MANIFEST, QUICK, Array, errors_of, peers, write_csv, write_study
@@ -104,6 +105,9 @@ def test_the_coarsest_curve_is_named_as_well(tmp_path: Path) -> None:
     assert all(f"frame {n}: {np.linalg.norm(two[1] - two[0]):.1f} mm in one line" in said for n, two in ends.items())
     begun_later = {0: WIRES[-1][[0, 1, -1]]}  # led back to the entry, or cut there
     assert "mm in one line" in rough(begun_later, 0.3, "the true wires", "give more")[0]
+    one_of_three = {n: wire if n else wire[[0, -1]] for n, wire in enumerate(WIRES[-3:])}
+    (some,) = rough(one_of_three, 0.3, "the simulated wires", "give more")
+    assert (MOSTLY_LINES in said, MOSTLY_LINES in some) == (True, False), "one shallow frame hid a wrong roll of all"
     assert rough({0: WIRES[-1][[0, 2]], 1: WIRES[-1][:1]}, 0.3, "the true wires", "give more") == []
     assert "own curves have few points" in ran(tmp_path, [wire[[0, -1]] for wire in WIRES])[1]
 

@@ -166,7 +166,7 @@ def test_a_label_that_a_file_cannot_have_is_seen_in_its_header(tmp_path, label, 
         mask_header(Mask(tmp_path / "seg.nrrd", label=label))
 
 
-def test_a_label_map_that_cannot_be_used_is_seen_before_a_run(tmp_path):
+def test_a_label_map_that_cannot_be_used_is_seen_before_a_run(tmp_path, monkeypatch):
     """`check` found nothing, and the run computed every other case before this one failed."""
     distance, voxel, origin = capsule()
     entry, path = origin + voxel * np.argwhere(distance == distance.min())[0], tmp_path / "lumen.nrrd"
@@ -181,6 +181,10 @@ def test_a_label_map_that_cannot_be_used_is_seen_before_a_run(tmp_path):
     assert "got 3 different values, 0, 1, 2" in several
     (inverted,) = problems(distance > 0.7)
     assert "has no voxel of the lumen within 1.5 mm, which spans" in inverted
+    monkeypatch.setattr("pipeline.study.own_lumen.read_lumen", None)
+    case = Mock(entry_mm=tuple(entry.tolist()), entry_sigma_mm=None)
+    again = lumen_problems(case, Mask(path), SegmentConfig().least_voxels)
+    assert list(again) == [inverted], "`score` of a simulator more read every lumen once more"
 
 
 @pytest.mark.parametrize("top", [1.0, 255.0])

@@ -25,11 +25,16 @@ from pipeline.load.geometry import LoadError, Source
 from pipeline.load.vtk import read_vtk_points
 from pipeline.load.wires import numbered_frames, read_wires
 from pipeline.model import Curve, OtherWire, arc_length
+from pipeline.run.case import Job
+from pipeline.run.inputs import Inputs, named_files
 from pipeline.run.stages.known import Frame
 from pipeline.run.stages.others import _aside, of_their_run
 from pipeline.simulate.others import begun, not_to_depth, numbered_otherwise, oddity, out_of_order, tightest_bend
 from pipeline.status import InputError
-from pipeline.study.others import found_for, named
+from pipeline.study.manifest import read_manifest
+from pipeline.study.others import Others, found_for, named
+from pipeline.study.settings import resolve
+from reports.doubts import OF_THEIR_RUN
 from reports.export import write_markups_curve, write_polyline_vtp
 from reports.verdict import remarks
 from tests.pipeline.known_study import FRAMES, PEERS, QUICK, Known, errors_of, peers, run_known, simulated, write_csv
@@ -430,13 +435,33 @@ def test_a_wire_that_its_own_run_refused_has_failed(known: Known, tmp_path: Path
 
 def test_wires_of_a_run_bring_its_warnings(tmp_path: Path) -> None:
     """A roll that a run was warned of was a score of its folder without a warning: statuses alone came along."""
-    (tmp_path / "result.json").write_text(json.dumps({"warnings": ["turned by -30 degrees", "few points"]}))
+    told = ["turned by -30 degrees", f"{OF_THEIR_RUN}it is kinked", "few points"]
+    result = {"warnings": ["500 of 1000 members were lost", *told], "warnings_of_wires": told}
+    (tmp_path / "result.json").write_text(json.dumps(result))
     wires, log = [Source(tmp_path / "frames.h5")], Mock(warnings=["few points"])
     assert of_their_run(Mock(**{"case.simulated.files": wires}, log=log)) == [
-        "in the run that made these wires: turned by -30 degrees"
+        "in the run that made these wires: turned by -30 degrees",
+        "in the run that made these wires: it is kinked",  # of a score of a score it was said twice
     ]
     assert of_their_run(Mock(**{"case.simulated.files": [Source(tmp_path / "wires.h5")]}, log=log)) == []
     assert of_their_run(Mock(**{"case.simulated": None}, log=log)) == []
+
+
+def test_the_result_beside_wires_is_an_input_of_theirs(known: Known, tmp_path: Path) -> None:
+    """Written anew, with other warnings and statuses, it was in no key: the same score said "kept"."""
+    (case,) = read_manifest(known[0]).cases
+    wires, result = tmp_path / "frames.h5", tmp_path / "result.json"
+    wires.write_bytes(b"wires")
+    scored = case.model_copy(update={"simulated": Others.model_construct(files=(Source(wires),))})
+    job = Job(scored, resolve([]), tmp_path / "out")
+    before = job.key
+    result.write_text('{"warnings": []}', encoding="utf-8")
+    assert job.key != before
+    assert named_files(scored)["simulated.result"] == result
+    assert result in Inputs.of(scored).states, "nor was it watched"
+    (tmp_path / "wire.csv").touch()
+    others = case.model_copy(update={"simulated": Others.model_construct(files=(Source(tmp_path / "wire.csv"),))})
+    assert "simulated.result" not in named_files(others)
 
 
 @pytest.mark.parametrize("frame", ['{"stage": "simulate"}', '{"frame": null}', '{"frame": 0, "status": 5}'])

@@ -14,16 +14,18 @@ import pytest
 from numpy.typing import NDArray
 
 from pipeline.cli import main
+from pipeline.run.aggregate import aggregate
 from pipeline.run.overall import found_cases, overall, ratio
-from pipeline.run.simulators import OF_SKILL, Piece, _as_far, _rows, side_by_side, write_comparison
+from pipeline.run.simulators import OF_SKILL, Piece, _alike, _as_far, _rows, side_by_side, write_comparison
 from pipeline.run.stages import others
 from pipeline.run.stages.known import Known
 from reports import tables
 from reports.case_page import render_case
-from reports.doubts import AMONG, COUNT_AS, MADE_FROM_TRACES, Doubt
+from reports.doubts import AMONG, COUNT_AS, MADE_FROM_TRACES, OF_THEIR_RUN, Doubt
+from reports.nearer import nearer
 from reports.run_page import render_index
 from reports.schema import ERRORS, FAILURES, POINTS, SIMULATORS, SUMMARY, WHERE
-from reports.simulators import _where, in_common, nearer, render_simulators
+from reports.simulators import _not_ours, _where, in_common, render_simulators
 from reports.verdict import remarks, verdict
 
 pytestmark = pytest.mark.usefixtures("invented")
@@ -415,6 +417,7 @@ def test_the_same_twice_is_a_tie(tmp_path: Path) -> None:
     said = write_comparison(tmp_path, both)
     assert set(pd.read_csv(tmp_path / "where.csv")["lead"].dropna()) == {"tie"}
     assert said[0] == "another and wireval have the same error at every point of all 24 frames: is one a copy?"
+    assert _alike({"a": [], "b": []}) == [], "of no frames nobody is a copy"
 
 
 def test_the_page(compared: Path) -> None:
@@ -505,6 +508,23 @@ def test_wires_that_were_made_from_the_traces_are_not_ok(tmp_path: Path) -> None
         page = own.read_text(encoding="utf-8")
         assert '<span class="status bad">made from the traces</span>' in page, "its own pages were green"
         assert "(rms) from the traced one" not in page
+
+
+def test_a_closed_gate_names_a_page_from_where_it_is_read(tmp_path: Path) -> None:
+    """On the page of all the place was relative to each simulator's own folder: that of the first one's page."""
+    theirs, ours = write_tree(tmp_path, even(0.3)), write_tree(tmp_path / "simulators" / "wireval", even(0.2))
+    write_comparison(tmp_path, {"another": theirs, "wireval": ours})
+    found = aggregate(ours, {"fail_if": ["rms_mm>0.1"]})
+    assert found.closed[0].endswith(f"), {ours.as_posix()}/cases/c5/report.html")
+    page = render_simulators(tmp_path).read_text(encoding="utf-8")
+    assert "), simulators/wireval/cases/c5/report.html.</p>" in page
+    assert "), cases/c5/report.html.</p>" in render_index(ours).read_text(encoding="utf-8")
+
+
+def test_a_warning_from_the_run_of_the_wires_is_none_where_our_wires_have_it() -> None:
+    """It began with the run that it is from, and so stood on the page as if theirs alone."""
+    theirs = {"a": [f"{OF_THEIR_RUN}turned by 9 degrees", f"{OF_THEIR_RUN}kinked", "faint"]}
+    assert _not_ours(theirs, {"a": ["turned by 9 degrees", "faint"]}) == [f"a: {OF_THEIR_RUN}kinked"]
 
 
 def test_insertions_that_look_like_one_have_no_green_badge(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ from reports import _content
 from reports.calibration import gained
 from reports.case_files import counted, counted_scans
 from reports.doubts import said_by_cases
-from reports.schema import SWEEP
+from reports.schema import SUMMARY, SWEEP, Column
 
 
 @pytest.mark.parametrize(
@@ -44,6 +44,14 @@ def test_a_tile_may_be_the_number_that_another_column_names() -> None:
     row = {"strongest_null": "previous", "null_previous_rms_mm": 0.5}
     assert _content.cards(entries, row) == [{"value": "0.500", "label": "of previous frame"}]
     assert _content.cards(entries, {}) == _content.cards(entries, {"strongest_null": pd.NA}) == []
+
+
+def test_rounding_is_no_length_in_tiles_and_tables_either() -> None:
+    """The verdict alone had 0 mm; the tile below it had 2.35e-16."""
+    row = {"rms_mm": 2.35e-16, "strain": 1e-7}
+    assert _content.cards([{"column": "rms_mm", "label": "rms"}], row)[0]["value"] == "0"
+    grid = _content.grid(pd.DataFrame([row]), [SUMMARY["rms_mm"], Column("strain", "1", "")])
+    assert [cell["value"] for cell in grid["rows"][0]["cells"]] == ["0", "1e-07"]
 
 
 def test_a_tile_says_where_it_is_over_fewer_frames_than_those_beside_it() -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from reports.doubts import OFF_THE_SCANS, Doubt, weightiest_first
+from reports.doubts import MOSTLY_LINES, OFF_THE_SCANS, Doubt, weightiest_first
 from reports.unscored import unscored
 from reports.verdict import badge, headline, in_short, of_these_alone, remarks, verdict
 from reports.what_next import next_command, typed, warned, worst_frames
@@ -61,7 +61,9 @@ def test_a_skill_of_one_insertion_says_nothing_of_others() -> None:
     """Three insertions were "not shown to be better"; with one group for them the same wires were better, full stop."""
     row = {"skill_strongest": 0.988, "strongest_null": "previous"}
     alone = "interval withheld: 1 insertion, at least 3 needed"
-    assert of_these_alone(row | {"interval": alone}).startswith("The skill tells of these insertions alone")
+    assert of_these_alone(row | {"interval": alone}).startswith("One insertion says nothing about others: scan")
+    two = {"interval": alone.replace("1 insertion", "2 insertions")}
+    assert of_these_alone(row | two).startswith("2 insertions say nothing")
     assert not of_these_alone(row | {"interval": "wide: 3 insertions"})
     assert not of_these_alone(row | {"interval": alone, "skill_strongest": -0.1}), "that is worse, of whatever"
 
@@ -227,7 +229,7 @@ def test_traces_off_the_scans_come_first_and_no_roll_is_advised() -> None:
     assert f"The weightiest of 3 warnings: {found}. The wire is worse" in said, "what to check is among the warnings"
     assert "With an unknown roll" not in said
     assert not remarks(row, doubt=doubt)
-    two_points = Doubt(warnings=["the wires have few points (frame 0: 7.8 mm in one line)"])
+    two_points = Doubt(warnings=[f"the wires have few points ({MOSTLY_LINES}): straight lines between them pass"])
     assert not remarks(row, "mine", two_points), "a wire of two points shows no roll, and few points are the cause"
     good = badge("ok", True, row | {"skill_strongest": 0.9}, Doubt(warnings=[off]))
     assert (good["text"], good["look"]) == ("ok, 1 warning", "poor")
@@ -249,13 +251,21 @@ def test_a_page_begins_with_three_sentences_and_says_each_definition_once() -> N
         "interval": "wide: 3 insertions",
     }
     said, more = headline(row, defined=False)
-    assert said.endswith(
+    assert (
         "On these frames it is not shown to be better (skill 0.500, its interval reaches -0.100) than "
         "the predictor 'another insertion'."
-    )
-    assert len(more) == 4
+    ) in said
+    assert said.endswith("weaker without the others."), "whether it may be quoted was behind a click"
+    assert "there the model is wrong, or an input is less certain than stated." in said
+    assert len(more) == 2
     assert verdict(row).count(". ") > 4
     assert all(text in verdict(row) for text in more)
+
+
+def test_a_page_of_copied_wires_names_no_predictor() -> None:
+    """Below a verdict that named none stood what the predictor 'centreline' is."""
+    row = {"rms_mm": 0.01, "skill_strongest": 0.99, "strongest_null": "centreline"}
+    assert headline(row, doubt=Doubt(copied="a: made")) == ("a: made.", [])
 
 
 def test_a_wrong_roll_is_guessed_at() -> None:

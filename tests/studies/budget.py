@@ -33,7 +33,7 @@ from pipeline.model import Array, Curve, Lumen, arc_length
 from pipeline.run.cache import Store
 from pipeline.run.log import Log
 from pipeline.run.stages import Context, Known
-from pipeline.run.stages.budget import Work
+from pipeline.run.stages.budget import Work, budgeted
 from pipeline.run.stages.compare import compare_frames
 from pipeline.run.stages.known import Frame
 from pipeline.run.stages.simulate import simulate_frames
@@ -156,7 +156,7 @@ def judged(seed: int, plant: str, config: Config) -> tuple[Context, Known]:
     given: Any = ("given",) * len(frames)
     known = Known(Scans(None, given), lumen, frames=frames)
     run = Context(case, config, Store(None), Log(lambda *_: None))
-    return run, compare_frames(run, simulate_frames(run, known))
+    return run, budgeted(run, compare_frames(run, simulate_frames(run, known)))
 
 
 def record(run: Context, known: Known, members: int) -> list[dict[str, Any]]:

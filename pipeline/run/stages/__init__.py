@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from pipeline.run.log import Stage
+from pipeline.run.stages.budget import budgeted
 from pipeline.run.stages.compare import compare_frames
 from pipeline.run.stages.known import Context, Known
 from pipeline.run.stages.load import open_case
@@ -18,7 +19,10 @@ from pipeline.status import StageError
 
 __all__ = ["Context", "Known", "run_stages"]
 
-STEPS: dict[Stage, Callable[[Context, Known], Known]] = {
+Step = Callable[[Context, Known], Known]
+OF_WIRES = ("simulate", "compare")
+"""Stages whose warnings concern the simulated wires; others' are of scans, traces and lumen, which a score has anew."""
+STEPS: dict[Stage, Step] = {
     "load": open_case,
     "segment": segment_vessel,
     "trace": trace_frames,
@@ -35,9 +39,20 @@ def run_stages(run: Context) -> Known:
             break
         run.log.begins(stage)
         try:
-            known = step(run, known)
+            known = _noted(stage, step, run, known)
+            known = budgeted(run, known) if stage == "compare" else known
         except StageError as error:
             unseen = scan_at_entry(run, known) if known.lumen is None else None
             return replace(known.failed(stage, error), at_entry=unseen)
-    run.log.warnings += of_their_run(run)
+    inherited = of_their_run(run)
+    run.log.warnings += inherited
+    run.log.of_wires += inherited
+    return known
+
+
+def _noted(stage: Stage, step: Step, run: Context, known: Known) -> Known:
+    """What is known after a step; what it warns of the simulated wires is noted apart."""
+    before = len(run.log.warnings)
+    known = step(run, known)
+    run.log.of_wires += run.log.warnings[before:] if stage in OF_WIRES else []
     return known

@@ -58,6 +58,8 @@ def budgeted(run: Context, known: Known) -> Known:
     """The case with the uncertainty budget of every frame and by source; unchanged where there can be none."""
     frames = [f for f in known.frames if f.ok and f.solved is not None and len(f.solved.joints_mm) > 1]
     settings = run.config.budget
+    if run.case.projections:
+        return known
     if settings.members and any(f.simulated is not None and f.solved is None for f in known.frames):
         run.log.assumptions.append(NOT_OURS)
     if not settings.members or not frames or known.clamp is None or not np.isfinite(known.segment_mm):

@@ -12,7 +12,6 @@ from pipeline.compare.nulls import Clues, PredictorInputs, score
 from pipeline.model import Array, Curve
 from pipeline.run.log import Log
 from pipeline.run.stages.beside import MOST_NAMED
-from pipeline.run.stages.budget import budgeted
 from pipeline.run.stages.contradicted import contradicted, from_traces
 from pipeline.run.stages.entries import four_entries, replayed_entries
 from pipeline.run.stages.known import Context, Frame, Known
@@ -33,7 +32,7 @@ def compare_frames(run: Context, known: Known) -> Known:
             return replace(known, frames=compare_in_views(run, known))
     clues = known.clues
     if clues is None:
-        return budgeted(run, replace(known, frames=_all_compared(run, known, None, {}, ())[0]))
+        return replace(known, frames=_all_compared(run, known, None, {}, ())[0])
     with run.log.timed("compare"):
         entered, simulated = _simulated_otherwise(run, known, clues)
         clues.known_ways()
@@ -44,7 +43,7 @@ def compare_frames(run: Context, known: Known) -> Known:
         *_truth_elsewhere(known.frames, _voxel_mm(known)),
         *_rough_truth(known),
     ]
-    return budgeted(run, known)
+    return known
 
 
 def _simulated_otherwise(

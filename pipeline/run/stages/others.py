@@ -28,6 +28,7 @@ from pipeline.simulate.others import (
 from pipeline.status import FrameStatus
 from pipeline.study.manifest import Case
 from reports.case_files import counted
+from reports.doubts import OF_THEIR_RUN
 from solver.self_contact import self_overlap_mm
 
 STEP_MM = 0.25
@@ -65,11 +66,11 @@ def frames_of_others(run: Context, known: Known) -> tuple[Frame, ...]:
 
 
 def of_their_run(run: Context) -> list[str]:
-    """What another run was warned of whose wires these are, where this one was not: a roll that it found wrong, say."""
+    """What the run that made these wires was warned of them and this one was not: a roll that it found wrong, say."""
     if run.case.simulated is None or not run.goes_to("simulate"):
         return []
-    said = (text for text in warned_beside(run.case.simulated.files) if text not in run.log.warnings)
-    return [f"in the run that made these wires: {text}" for text in said]
+    said = (text.removeprefix(OF_THEIR_RUN) for text in warned_beside(run.case.simulated.files))
+    return [f"{OF_THEIR_RUN}{text}" for text in said if text not in run.log.warnings]
 
 
 def _listed(files: Sequence[OtherFile]) -> str:

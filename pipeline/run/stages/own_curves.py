@@ -19,7 +19,7 @@ from pipeline.simulate.others import begun, oddity
 from pipeline.status import FrameStatus
 from pipeline.trace import of_length
 from reports.case_files import listed
-from reports.doubts import IN_ONE_LINE
+from reports.doubts import MOSTLY_LINES
 from solver import Grid
 
 OUTSIDE_VOXELS, MOST_OUTSIDE = 2.0, 0.25
@@ -35,6 +35,7 @@ LONE, UNSEEN_RADIUS_MM = 0.9, 20.0
 LEAST_BEND_MM = 0.01
 """By how much a curve that is not straight is longer than its chord: as 5 mm of a wire with a radius of 20 mm."""
 MOST_NAMED = 6
+_LINE = "mm in one line"
 RESAMPLE = "give more; 3D Slicer saves a curve's control points alone: resample it before it is saved"
 
 
@@ -106,8 +107,9 @@ def rough(curves: Mapping[int, Array], voxel_mm: float, whose: str, mend: str) -
     coarse = [f"frame {n}: {text}" for n, text in told.items() if text]
     if not coarse:
         return []
+    mostly = f" ({MOSTLY_LINES})" * (2 * sum(_LINE in text for text in told.values()) > len(told))
     return [
-        f"{whose} have few points: straight lines between them pass beside a smooth wire "
+        f"{whose} have few points{mostly}: straight lines between them pass beside a smooth wire "
         f"({listed(coarse, MOST_NAMED)}; they may pass {CORNER_VOXELS * voxel_mm:.2f} mm beside it): {mend}"
     ]
 
@@ -122,7 +124,7 @@ def _cut(points_mm: Array, allowed_mm: float) -> str:
     steps = np.linalg.norm(np.diff(points_mm, axis=0), axis=1)
     length, longest = float(steps.sum()), float(steps.max())
     if longest > LONE * length:
-        return f"{length:.1f} {IN_ONE_LINE}" if longest**2 / (8.0 * UNSEEN_RADIUS_MM) > allowed_mm else ""
+        return f"{length:.1f} {_LINE}" if longest**2 / (8.0 * UNSEEN_RADIUS_MM) > allowed_mm else ""
     mm = corner_mm(points_mm)
     return f"{mm:.2f} mm beside it" if mm > allowed_mm else ""
 
