@@ -312,6 +312,7 @@ def test_a_lumen_that_lies_elsewhere_is_what_fails(
     assert run(folder, tmp_path / "out", *QUICK) == 2
     assert "has no voxel of the lumen within 1.5 mm, which spans" in capsys.readouterr().err
     monkeypatch.setattr(own_lumen, "MOST_VOXELS", 0)
+    folder = with_lumen(study, tmp_path / "again", labels, like)
     assert run(folder, tmp_path / "out", *QUICK) == 1
     assert set(errors_of(tmp_path / "out")["status"]) == {"segment_failed"}
     assert "outside the given lumen, which spans" in (tmp_path / "out" / "failures.csv").read_text(encoding="utf-8")
