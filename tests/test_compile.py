@@ -33,13 +33,19 @@ def test_nothing_is_cached_past_the_mechanism(package: str) -> None:
     assert not wrong, "use on_disk of _compile"
 
 
-@pytest.mark.parametrize("package", ONE)
-def test_an_edited_callee_is_compiled_again(package: str, tmp_path: Path) -> None:
-    """The callee stands two files away, and its new text has the length and the time of the old one."""
+def package_in(tmp_path: Path, package: str) -> Path:
+    """A package of this name that holds the mechanism alone."""
     folder = tmp_path / package
     folder.mkdir()
     (folder / "__init__.py").touch()
     (folder / "_compile.py").write_text((ROOT / package / "_compile.py").read_text(encoding="utf-8"))
+    return folder
+
+
+@pytest.mark.parametrize("package", ONE)
+def test_an_edited_callee_is_compiled_again(package: str, tmp_path: Path) -> None:
+    """The callee stands two files away, and its new text has the length and the time of the old one."""
+    folder = package_in(tmp_path, package)
     head = f"from {package}._compile import on_disk\n"
     kernel = head + "{imports}\n\n@on_disk()\ndef {name}():\n    return {value}\n"
     (folder / "callee.py").write_text(kernel.format(imports="", name="callee", value=1), encoding="utf-8")
@@ -59,10 +65,7 @@ def test_an_edited_callee_is_compiled_again(package: str, tmp_path: Path) -> Non
 @pytest.mark.parametrize("package", ONE)
 def test_code_without_docstrings_is_kept_beside_that_with_them(package: str, tmp_path: Path) -> None:
     """PYTHONOPTIMIZE=2 and a plain run took each other's files, so that each compiled all anew."""
-    folder = tmp_path / package
-    folder.mkdir()
-    (folder / "__init__.py").touch()
-    (folder / "_compile.py").write_text((ROOT / package / "_compile.py").read_text(encoding="utf-8"))
+    folder = package_in(tmp_path, package)
     text = f'from {package}._compile import on_disk\n\n@on_disk()\ndef caller():\n    "Why."\n    return 1\n'
     (folder / "caller.py").write_text(text, encoding="utf-8")
     for options in ((), ("-OO",)):
@@ -102,10 +105,7 @@ def test_two_processes_that_compile_at_one_time_do_not_mix_their_code(package: s
 @pytest.mark.parametrize("package", ONE)
 def test_a_part_of_callers_runs_in_them_alone(package: str, tmp_path: Path) -> None:
     """Compiled here or read from the disk it computes, raises with its message, and is refused to Python."""
-    folder = tmp_path / package
-    folder.mkdir()
-    (folder / "__init__.py").touch()
-    (folder / "_compile.py").write_text((ROOT / package / "_compile.py").read_text(encoding="utf-8"))
+    folder = package_in(tmp_path, package)
     head = f"from {package}._compile import on_disk, part_of_callers\n\n"
     text = head + (
         "@part_of_callers()\ndef root(x):\n    if x < 0:\n        raise ValueError('of', x)\n    return x**0.5\n\n"
