@@ -9,7 +9,7 @@ from reports.case_files import counted
 from reports.schema import ERRORS
 
 BEFORE_COMPARE = {
-    *("insertion_mm", "max_penetration_mm", "push_force_N", "iterations", "num_mm"),
+    *("insertion_mm", "max_penetration_mm", "push_force_N", "iterations", "num_mm", "num_push_N"),
     *("trace_sigma_mm", "trace_mean_mm", "trace_max_mm", "trace_tip_mm"),
 }
 """What a run has that ended before frames are compared: no number of it says how far a simulated wire is off."""

@@ -84,7 +84,8 @@ def error_row(frame: Frame) -> dict[str, Any]:
     if wire is not None:
         row["max_penetration_mm"] = wire.max_penetration_mm
     if isinstance(wire, Solution):
-        row |= {"push_force_N": wire.push_force_N, "iterations": wire.iterations, "num_mm": frame.num_mm}
+        row |= {"push_force_N": wire.push_force_N, "num_push_N": frame.num_push_N}
+        row |= {"iterations": wire.iterations, "num_mm": frame.num_mm}
         row |= {"snaps": len(wire.snaps), "uncertain": frame.uncertain, "least_pivot": wire.least_pivot}
     return row | budget_of(frame)
 

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from pipeline.arrays.polyline import at_arc
 from pipeline.model import Array, arc_length
@@ -38,12 +38,13 @@ class Resolved:
 
     segment_mm : length of the segments.     wires : one for each depth.     reason : how the length was chosen.
     num_mm : (depths,) bound of the root mean square distance of each wire from the one of endlessly short segments; NaN
-    where one of the two lengths did not reach the depth.
+    where one of the two lengths did not reach the depth.     num_push_N : (depths,) the same of the push.
     """
 
     segment_mm: float
     wires: Sequence[Solution]
     num_mm: Array
+    num_push_N: Array
     reason: str
 
 
@@ -69,25 +70,28 @@ def resolve(insert: Insert, lengths: Sequence[float]) -> Resolved:
     A length that loses depths which a longer one reached is not taken; a shorter one may reach them again.
     """
     # the first length only serves for comparison: where it snaps aside, the next pair of lengths is needed, too
-    segment, wires, num = lengths[0], insert(lengths[0], len(lengths) == 1), np.full(0, np.nan)
+    segment, wires = lengths[0], insert(lengths[0], len(lengths) == 1)
+    num = push = np.full(len(wires), np.nan)
     reason, before = "no coarser segments can follow the wire's rest curvature: no estimate of their error", wires
     for shorter in lengths[1:]:
         finer = insert(shorter, True)
         moved = np.array([moved_mm(a, b) for a, b in zip(before, finer, strict=True)])
-        before = finer
+        pushed, before = _pushed_N(before, finer), finer
         if len(lengths) > 2 and _reached(finer) < _reached(wires):
             reason = "with shorter ones fewer depths are reached"
             continue
         # a wire that is about to snap goes one way or the other for tiny causes, with segments of any length
         away = ~(moved <= AGREED_MM) & np.array([not wire.uncertain for wire in finer], dtype=bool)
-        segment, wires, num = shorter, finer, moved
+        segment, wires = shorter, finer
+        # the wires that moved further snapped aside, and say nothing of other depths
+        num, push = (_bound(x, moved <= AGREED_MM, most) for x, most in ((moved, AGREED_MM), (pushed, np.inf)))
         if not away.any():
             reason = f"halving them moved no wire by more than {AGREED_MM} mm, near snaps apart"
             break
         reason = f"at {int(away.sum())} of {len(num)} depths the wire still depends on their length"
     if segment == lengths[0] and len(lengths) > 1:
         wires = insert(segment, True)
-    return Resolved(segment, wires, num if num.size else np.full(len(wires), np.nan), reason)
+    return Resolved(segment, wires, num, push, reason)
 
 
 def moved_mm(coarse: Solution, fine: Solution) -> float:
@@ -96,6 +100,26 @@ def moved_mm(coarse: Solution, fine: Solution) -> float:
         return float("nan")
     apart = coarse.joints_mm - at_arc(fine.joints_mm, arc_length(coarse.joints_mm))
     return max(float(np.sqrt(np.mean(np.sum(apart**2, axis=1)))), SMALLEST_MM)
+
+
+def _bound(change: Array, alike: NDArray[np.bool_], largest: float) -> Array:
+    """What halving the segments changed, or twice its root mean square over depths where that is more, to ``largest``.
+
+    Errors change their sign along the way, so that one depth's change is small by chance: alone it covered 85 % of the
+    errors in vessels drawn at random, the two together 97 %. alike : (depths,) which speak for others.
+    """
+    typical = change[alike]
+    return np.maximum(change, min(2.0 * float(np.sqrt(np.mean(typical**2))), largest)) if typical.size else change
+
+
+def _pushed_N(coarse: Sequence[Solution], fine: Sequence[Solution]) -> Array:
+    """How far the push moved, N, at each depth; NaN where one of both is not at rest.
+
+    In lumens with hardly any room it is the slope of the voxels' waves in the wall, and wrong by all of it.
+    """
+    both = list(zip(coarse, fine, strict=True))
+    at_rest = [a.converged and b.converged for a, b in both]
+    return np.where(at_rest, [abs(a.push_force_N - b.push_force_N) for a, b in both], np.nan)
 
 
 def _reached(wires: Sequence[Solution]) -> int:

@@ -125,6 +125,10 @@ def forces_by_depth(case: CaseFiles) -> Drawing | None:
         return None
     figure, (top, forces), (bottom, overlaps) = _two_panels(good, 4.6, "force_by_depth", "overlap_by_depth")
     top.axhline(0.0, color="0.6", linewidth=0.8)
+    if has(good, "num_push_N"):
+        push, bound = good["push_force_N"], good["num_push_N"]
+        top.fill_between(good["insertion_mm"], push - bound, push + bound, color=SIMULATED, alpha=0.15, linewidth=0)
+        forces = [*forces, "num_push_N"]
     from_zero(bottom)
     _finish({top: "push force, N", bottom: "deepest overlap\nwith the wall, mm"})
     return Drawing(figure, _table(case, [*forces, *overlaps]), frames=_depths(case, top, bottom))

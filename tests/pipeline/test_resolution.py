@@ -12,8 +12,10 @@ from pipeline.benchmark.vessels import lumen_distance
 from pipeline.compare.metrics import point_to_curve, rms
 from pipeline.run.stages.known import Frame
 from pipeline.run.stages.simulate import judged
+from pipeline.simulate.config import Segment
 from pipeline.simulate.resolution import FINEST_MM, Resolved, lengths_mm, resolve
-from solver import GuideWire, Insertion, Solution, Status
+from solver import Grid, GuideWire, Insertion, Solution, Status, VesselWall
+from tests.studies.short_segments import compared, in_little_room
 
 CURVED = [(0.0, 0.3), (6.0, 0.3), (6.0, 0.0)]
 
@@ -73,6 +75,38 @@ def test_the_bound_is_no_idle_one() -> None:
     coarse = resolve(partial(insert, siphon()), lengths_mm(1.0, CURVED))
     assert coarse.segment_mm == 1.0
     assert np.nanmax(coarse.num_mm) > 3 * np.nanmax(found.num_mm)
+
+
+def test_the_push_has_a_bound_of_its_own() -> None:
+    """Where the lumen leaves no room the shape is right and the push is the slope of the voxels' waves, wrong by all of
+    it. Nothing said so."""
+    rows = compared(in_little_room(0.25), [[0.0, 0.1], [6.0, 0.1], [6.0, 0.0]])
+    off, num, (pushed, right), bound = rows[:, 0], rows[:, 1], rows[:, 2:4].T, rows[:, 4]
+    assert np.all(off <= num)
+    assert np.abs(pushed - right).max() > 4 * np.abs(right).max()
+    assert np.all(np.abs(pushed - right) <= bound)
+    found, _ = resolved("bend")
+    limit = np.array([wire.push_force_N for wire in insert(bend(), FINEST_MM)])
+    off = np.abs(limit - [wire.push_force_N for wire in found.wires])
+    assert np.mean(off <= found.num_push_N) >= 0.95
+    assert found.num_push_N.max() < 0.1 * limit.max()
+
+
+@pytest.mark.parametrize("asked", [1.0, "auto"])
+def test_the_bound_knows_a_push_that_is_wrong_where_the_wire_is_pressed_at_its_entry(asked: Segment) -> None:
+    """The joint that is held beyond the entry makes it a few hundredths of a newton."""
+    axes = np.arange(-2.5, 2.6, 0.25), np.arange(-2.5, 2.6, 0.25), np.arange(-3.0, 22.1, 0.25)
+    x, y, _ = np.meshgrid(*axes, indexing="ij")
+    tube = VesselWall(Grid(np.hypot(x, y) - 1.0, np.full(3, 0.25), np.array([-2.5, -2.5, -3.0])), 3.0)
+
+    def pressed(segment_mm: float, refined: bool) -> Sequence[Solution]:
+        insertion = Insertion(GuideWire(segment_mm, 0.18, 1.0), tube, [1.02, 0.0, 0.0], [0.0, 0.0, 1.0])
+        return list(insertion.to_depths([5.0, 10.0, 15.0, 18.25]))
+
+    found, limit = resolve(pressed, lengths_mm(asked, 0.0)), pressed(FINEST_MM, True)
+    off = np.array([abs(a.push_force_N - b.push_force_N) for a, b in zip(found.wires, limit, strict=True)])
+    assert off.max() > 5 * max(abs(wire.push_force_N) for wire in limit)
+    assert np.all(off <= found.num_push_N)
 
 
 def test_a_length_that_loses_depths_is_not_taken() -> None:

@@ -90,7 +90,7 @@ def test_a_folder_of_a_sweep_may_be_scored() -> None:
     assert named(["mine=out/sweep/simulate.friction=0.2"]) == {"mine": Path("out/sweep/simulate.friction=0.2")}
 
 
-SOLVERS = ("push_force_N", "iterations", "num_mm", "snaps", "uncertain", "least_pivot")
+SOLVERS = ("push_force_N", "num_push_N", "iterations", "num_mm", "snaps", "uncertain", "least_pivot")
 """Columns that only the solver itself can fill."""
 
 

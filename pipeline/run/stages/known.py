@@ -38,7 +38,8 @@ class Frame:
     status : identifier (``ok``, a FrameStatus or a solver status).     stage, message : where and why it is not ok.
     expected_mm : depth that the manifest states.     depth_mm : depth that was simulated.
     catheter_mm : depth of the tip of a catheter over the wire.
-    num_mm : estimated distance of the simulated wire from the one of endlessly short segments.
+    num_mm : estimated distance of the simulated wire from the one of endlessly short segments; num_push_N : the same of
+    its push.
     view, in_view_mm : the X-ray projection of a frame without a scan; the wire that was seen (n, 2) and the simulated
     one (k, 2) on the plane through the isocentre.
     projections, straightened : of the scan: its maxima along the array axes, and planes across the traced wire.
@@ -58,6 +59,7 @@ class Frame:
     curve: Curve | None = None
     simulated: Solution | OtherWire | None = None
     num_mm: float = float("nan")
+    num_push_N: float = float("nan")
     comparison: Comparison | None = None
     view: View | None = None
     in_view_mm: tuple[Array, ...] = ()

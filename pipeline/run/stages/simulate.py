@@ -70,9 +70,10 @@ def _replayed(run: Context, known: Known) -> Known:
     both = zip(replay, resolved.wires, strict=True)
     untraced = {frame.index: wire.joints_mm for frame, wire in both if frame.curve is None and wire.converged}
     log.warnings += turned_back(known.vessel.distance, known.held.entry_mm, untraced)
-    for frame, wire, num_mm in zip(replay, resolved.wires, resolved.num_mm, strict=True):
+    bounds = zip(resolved.num_mm, resolved.num_push_N, strict=True)
+    for frame, wire, (num_mm, num_push_N) in zip(replay, resolved.wires, bounds, strict=True):
         log.warnings += [_told(frame.index, snap) for snap in wire.snaps]
-        found = replace(frame, simulated=wire, num_mm=float(num_mm))
+        found = replace(frame, simulated=wire, num_mm=float(num_mm), num_push_N=float(num_push_N))
         frames[frame.index] = judged(found, wire, case.wire.radius_mm, case.catheter)
     log.warnings += _pressed_deep(replay, resolved.wires, case.wire.radius_mm)
     if case.catheter is not None and known.lumen is not None:
