@@ -1,6 +1,7 @@
 """segment: scan -> lumen. A method finds the vessel's voxels, its grey values say where the wall lies."""
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -16,6 +17,7 @@ from pipeline.segment import bone, leaked, thin, uneven, valley
 from pipeline.segment.config import SegmentConfig
 from pipeline.segment.contact import warning
 from pipeline.segment.cut_off import cut_off
+from pipeline.segment.embedded import surrounding
 from pipeline.segment.ends import ends
 from pipeline.segment.flat_side import flat_side
 from pipeline.segment.fuzzy import fuzzy_region
@@ -65,17 +67,20 @@ class _Found:
 
 
 def _found(grid: Grid, seeds_mm: ArrayLike, config: SegmentConfig, wire: bool) -> _Found:
-    """The vessel; where it lies in a layer, the one that is found with nothing darker than that."""
+    """The vessel; where it lies in a wall or a block of its own, the one that is found with that around it."""
     found = _as_shown(grid, seeds_mm, config, wire, METHOD)
-    layer = layer_around(grid, found.distance, found.site.corner, found.region.levels.seed)
-    if layer is None:
+    around = grid, found.distance, found.site.corner
+    seed, noise = found.region.levels.seed, found.region.levels.noise_left
+    layer = layer_around(*around, seed)
+    if layer is not None:
+        method = partial(METHOD, noise_left=noise)
+        # where no vessel is left within it, it was none
+        with suppress(StageError):
+            return replace(_as_shown(with_layer_alone(layer, *around), seeds_mm, config, wire, method), layer=layer)
+    block = surrounding(*around, seed, found.wall.blur_mm)
+    if block is None:
         return found
-    shown = with_layer_alone(layer, grid, found.distance, found.site.corner)
-    method = partial(METHOD, noise_left=found.region.levels.noise_left)
-    try:
-        return replace(_as_shown(shown, seeds_mm, config, wire, method), layer=layer)
-    except StageError:  # no vessel is left within it: it was none
-        return found
+    return replace(_as_shown(grid, seeds_mm, config, wire, partial(METHOD, outside=block)), tissue=block)
 
 
 def _as_shown(

@@ -48,9 +48,8 @@ def _start(grid: Grid, seeds: Index, outside: float | None) -> tuple[GreyLevels,
 
     outside : the grey around the vessel, where that at the seed is not the brightest.
     """
-    found = [levels_at(grid, seed) for seed in seeds]
+    found = [levels_at(grid, seed, outside) for seed in seeds]
     levels = max((f[0] for f in found), key=lambda a: a.contrast / max(a.noise, 1e-9))
-    levels = levels if outside is None else replace(levels, outside=outside)
     if not levels.contrast > LEAST_CONTRAST * levels.noise:
         got = f"grey: got {levels.inside:.0f} at the seed, {levels.outside:.0f} around, noise {levels.noise:.0f}"
         got += _at(grid, seeds)

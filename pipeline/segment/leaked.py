@@ -54,7 +54,7 @@ def warning(tissue: float | None, vessel: float) -> tuple[str, ...]:
     if tissue is None:
         return ()
     return (
-        f"segment: something of grey {tissue:.0f} that is far thicker than the vessel, of {vessel:.0f}, hangs together "
-        "with it: it is taken for what surrounds it; where it is a part of the vessel that is filled less, as a sac, "
-        "scan with the vessel filled, or give the lumen as a file (manifest key lumen)",
+        f"segment: something of grey {tissue:.0f} that surrounds the vessel, of {vessel:.0f}, or is far thicker, hangs "
+        "together with it: it is taken for what lies around it; where it is a part of the vessel that is filled less, "
+        "as a sac, scan with the vessel filled, or give the lumen as a file (manifest key lumen)",
     )

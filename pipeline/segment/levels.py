@@ -121,12 +121,12 @@ def _surroundings(grey: NDArray[Any], seed: float) -> tuple[float, float]:
     return top, 0.5 * (bottom + top)
 
 
-def _two_levels(grey: NDArray[Any], seed: float, at: tuple[int, ...]) -> _Levels:
-    """The two levels in a box, by fixed point.
+def _two_levels(grey: NDArray[Any], seed: float, at: tuple[int, ...], known: float | None) -> _Levels:
+    """The two levels in a box, by fixed point. known : the outer one, where it is.
 
     The region's median is held near the seed's grey, lest bone that touches it be taken for the vessel.
     """
-    outside, floor = _surroundings(grey, seed)
+    outside, floor = _surroundings(grey, seed) if known is None else (known, np.inf)
     inside = seed
     region = apart = np.zeros(grey.shape, bool)
     for _ in range(6):
@@ -143,17 +143,20 @@ def _two_levels(grey: NDArray[Any], seed: float, at: tuple[int, ...]) -> _Levels
     return _Levels(inside, outside, region, float(np.mean(apart)))
 
 
-def levels_at(grid: Grid, index: NDArray[Any]) -> tuple[GreyLevels, NDArray[np.int64]]:
-    """GreyLevels around one seed voxel, and the voxel (3,) to start at: that of median smoothed grey among its 3^3."""
+def levels_at(grid: Grid, index: NDArray[Any], outside: float | None = None) -> tuple[GreyLevels, NDArray[np.int64]]:
+    """GreyLevels around one seed voxel, and the voxel (3,) to start at: that of median smoothed grey among its 3^3.
+
+    outside : the grey around the vessel, where it is known.
+    """
     for half in BOXES_MM:
-        levels, found, dark = _levels_in(grid, box_around(grid, index, half, LEAST_BOX), index)
+        levels, found, dark = _levels_in(grid, box_around(grid, index, half, LEAST_BOX), index, outside)
         if dark >= LEAST_DARK:
             break
     return levels, found
 
 
 def _levels_in(
-    grid: Grid, box: tuple[slice, slice, slice], index: NDArray[Any]
+    grid: Grid, box: tuple[slice, slice, slice], index: NDArray[Any], known: float | None
 ) -> tuple[GreyLevels, NDArray[np.int64], float]:
     """What ``levels_at`` returns, of a box around the seed, and the share of the box that lies off the vessel."""
     raw = np.asarray(grid.values[box], np.float32)
@@ -166,7 +169,7 @@ def _levels_in(
     seed = float(np.median(around))
     best = np.unravel_index(int(np.argmin(np.abs(around - seed))), around.shape)
     at = tuple(int(b) + s.start for b, s in zip(best, inner, strict=True))
-    inside, outside, region, dark = _two_levels(grey, seed, at)
+    inside, outside, region, dark = _two_levels(grey, seed, at, known)
     found = start + np.array(at)
     noise = voxel_noise(raw - grey, region)
     left = noise_left(raw, region, grey > 0.5 * (inside + outside), noise)
