@@ -117,7 +117,7 @@ def _even(weights: Sequence[Array]) -> list[Array]:
 def _starts(problem: Problem) -> list[Array]:
     """Vectors to begin with: everything as stated, but rolls from where the objective has its lowest local minima."""
     means, _ = problem.prior
-    if all(np.all(np.asarray(one.trial.wire.rest_curvature_per_mm) == 0.0) for one in problem.evidence):
+    if not any(one.trial.wire.curved for one in problem.evidence):
         return [means]
     at = [u.name for u in problem.free].index(ROLL)
     xs = []

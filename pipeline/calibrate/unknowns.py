@@ -115,8 +115,7 @@ def lacking(wire: Wire) -> dict[str, tuple[str, str]]:
     if stiffness.ndim == 0 or stiffness[0, 1] == stiffness[-1, 1]:
         why = "the wire is stated as stiff at its tip as at its shaft: no scan tells a factor between them"
         found[TAPER] = why, "state bending_stiffness_N_mm2 as [distance from the tip, EI] pairs that rise to the shaft"
-    curvature = np.array(wire.rest_curvature_per_mm, dtype=float)
-    if not np.any(curvature if curvature.ndim == 0 else curvature[:, 1]):
+    if not wire.curved:
         why, do = (
             "the wire is stated straight: no scan tells",
             "state rest_curvature_per_mm if the real tip is curved",

@@ -21,7 +21,7 @@ from pipeline.calibrate.design import predicted, straight_to
 from pipeline.calibrate.estimates import Estimate, _followed, _judged, calibrated
 from pipeline.calibrate.fit import Problem
 from pipeline.calibrate.residuals import Evidence, weights_of
-from pipeline.calibrate.search import Fit, own_roll, roll_fitted
+from pipeline.calibrate.search import Fit, fitted, own_roll, roll_fitted
 from pipeline.calibrate.trials import OWN, Point, Trial, replayed
 from pipeline.calibrate.unknowns import BENDING, FRICTION, REST, ROLL, TAPER, bent, lacking, spread_in_words, unknowns
 from pipeline.cli import main
@@ -251,6 +251,13 @@ def test_a_straight_uniform_wire_shows_no_roll_and_no_taper():
     unseen = {e.unknown.name for e in fit.estimates if not e.seen}
     assert {ROLL, REST, TAPER} <= unseen
     assert all(fit.values[name] == 0.0 for name in (ROLL, REST, TAPER))
+
+
+def test_a_straight_wire_is_followed_from_one_roll_however_it_is_stated():
+    """Stated as pairs its distances counted as curvature: 24 rolls were tried, and three starts followed to one end."""
+    for straight in (0.0, [(0.0, 0.0), (8.0, 0.0)]):
+        one = trial(replace(WIRE, rest_curvature_per_mm=straight), depths=(10.0, 16.0))
+        assert len(fitted(all_of(one), [Evidence(one)], SETTINGS).starts) == 1
 
 
 def test_a_wire_is_told_what_it_is_stated_without():
