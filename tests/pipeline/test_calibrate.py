@@ -298,7 +298,7 @@ def test_what_follows_in_a_profile_stays_within_its_bounds():
     normal = np.linalg.inv(together * np.outer(deviations, deviations))
     root, low = np.linalg.cholesky(normal).T, np.array([-1.0, 0.0, -np.inf])
     problem: Any = SimpleNamespace(
-        prior=(np.zeros(3), np.full(3, np.inf)), clipped=lambda x: np.maximum(x, low), value=lambda _, r: r[0] @ r[0]
+        prior=(np.zeros(3), np.full(3, np.inf)), precision=0.0, clipped=lambda x: np.maximum(x, low)
     )
     linear: Any = SimpleNamespace(normal=normal, jacobian=[root])
     for taper in (0.16, -0.16):
@@ -315,7 +315,8 @@ def test_what_follows_in_a_profile_stays_within_its_bounds():
 
 def test_nothing_follows_residuals_that_are_no_numbers():
     """A profile that met one never ended."""
-    problem: Any = SimpleNamespace(prior=(np.zeros(2), np.full(2, np.inf)), clipped=lambda x: np.maximum(x, -1.0))
+    prior = np.zeros(2), np.full(2, np.inf)
+    problem: Any = SimpleNamespace(prior=prior, precision=0.0, clipped=lambda x: np.maximum(x, -1.0))
     linear: Any = SimpleNamespace(normal=np.eye(2), jacobian=[np.eye(2)])
     start = np.array([0.1, 0.2])
     assert np.array_equal(_followed(problem, linear, 0, start, [np.full(2, np.nan)]), start)
