@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.model import Wire
-from pipeline.ranges import Profile
+from pipeline.ranges import Profile, scaled
 
 MOST_CURVED = 4.0
 """Largest factor on the rest curvature that is tried."""
@@ -97,12 +97,7 @@ def bent(wire: Wire, values: Mapping[str, float]) -> Wire:
         reach = np.log(ei[-1] / ei[0])
         share = np.log(ei / ei[0]) / reach if reach else np.zeros(len(ei))
         changed = [(float(s), float(value)) for s, value in zip(at, ei * scale * shaft**share, strict=True)]
-    curved: Profile
-    if isinstance(curvature, (int, float)):
-        curved = float(curvature * rest)
-    else:
-        curved = [(s, float(value * rest)) for s, value in curvature]
-    return replace(wire, bending_stiffness_N_mm2=changed, rest_curvature_per_mm=curved)
+    return replace(wire, bending_stiffness_N_mm2=changed, rest_curvature_per_mm=scaled(curvature, rest))
 
 
 def lacking(wire: Wire) -> dict[str, tuple[str, str]]:
