@@ -10,8 +10,8 @@ from solver.grid import Array, Grid, read_only
 
 MAD = 1.4826
 """Standard deviation of normal noise over its median absolute deviation."""
-TIED = 0.01
-"""Share of all deviations from which on as many being the same are no chance."""
+TIED = 0.1
+"""Share of all deviations that are the median from which on they are whole greys of little noise (up to 6)."""
 LATTICE_MM, LATTICE_VOXELS = 0.3, 60e6
 """Voxels of a lumen that comes without a lattice; they are larger where its box would hold more than so many."""
 
