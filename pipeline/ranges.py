@@ -52,6 +52,15 @@ Vector = tuple[Finite, Finite, Finite]
 _Plain = Annotated[float, Number]
 Profile = _Plain | list[tuple[_Plain, _Plain]]
 """A number for the whole wire, or pairs (distance from the tip in mm, value), linear between, constant beyond."""
+
+
+def scaled(profile: Profile, factor: float) -> Profile:
+    """A profile with its values, not its distances, times a factor."""
+    if isinstance(profile, (int, float)):
+        return float(profile * factor)
+    return [(distance, float(value * factor)) for distance, value in profile]
+
+
 _PROFILE = WithJsonSchema(
     {
         "anyOf": [

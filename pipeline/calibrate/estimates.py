@@ -151,9 +151,7 @@ def _followed(problem: Problem, linear: Linear, fixed: int, x: Array, residual: 
     What the step takes beyond its bounds stays there, and the others follow that: clipped at the end, they followed a
     friction below 0, and a taper one standard deviation off was told as three.
     """
-    means, sigmas = problem.prior
-    inverse = np.where(sigmas > 0, 1.0 / np.where(sigmas > 0, sigmas, 1.0) ** 2, 1e12)
-    right = inverse * (means - x)
+    right = problem.precision * (problem.prior[0] - x)
     for jacobian, r in zip(linear.jacobian, residual, strict=True):
         right = right + jacobian.T @ r
     held, moved = np.arange(len(x)) == fixed, x

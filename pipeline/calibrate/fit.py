@@ -97,6 +97,17 @@ class Problem:
             sigmas[part] = np.minimum(sigmas[part], one.trial.sigmas)
         return means, sigmas
 
+    @property
+    def even(self) -> list[Array]:
+        """Weights by which every frame counts as much."""
+        return [np.ones(len(one.trial.seen)) for one in self.evidence]
+
+    @property
+    def precision(self) -> Array:
+        """One over the priors' variances (p,); what is known exactly is held by a great one."""
+        sigmas = self.prior[1]
+        return 1.0 / np.where(sigmas > 0, sigmas, 1e-6) ** 2
+
     def points(self, x: Array) -> list[Point]:
         """A vector as one Point per case: the shared parameters and its own numbers."""
         shared = self.held | {u.name: float(v) for u, v in zip(self.free, x, strict=False)}
@@ -173,10 +184,8 @@ class Problem:
         """The normal equations from the residuals ``base`` and the derivatives ``slopes`` of each insertion."""
         surprise = [one.surprise(rows) for one, rows in zip(self.evidence, base, strict=True)]
         weights, scale = weights_of(surprise, stated=self.stated)
-        means, sigmas = self.prior
-        free = sigmas > 0
-        inverse = np.where(free, 1.0 / np.where(free, sigmas, 1.0) ** 2, 1e12)
-        normal, right, jacobians, residuals = np.diag(inverse), inverse * (means - x), [], []
+        normal, right = np.diag(self.precision), self.precision * (self.prior[0] - x)
+        jacobians, residuals = list[Array](), list[Array]()
         for one, rows, (across, push), weight in zip(self.evidence, base, slopes, weights, strict=True):
             r = one.whitened(rows.across_mm, np.nan_to_num(rows.force_N), weight, scale)
             j = one.whitened(across, push, weight, scale)

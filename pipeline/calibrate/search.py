@@ -47,11 +47,9 @@ def fitted(free: Sequence[Unknown], evidence: Sequence[Evidence], solver: Solver
     first = Problem(slippery, {FRICTION: 0.0}, tuple(evidence), solver)
     followed = [first.solved(x, FIRST_ROUNDS) for x in _starts(first)]
     # each solution has a scale of its own: their objectives are compared at a common one
-    weights, scale = followed[0].weights, min(one.scale for one in followed)
-    values = [
-        first.value(one.x, r)
-        for one, r in zip(followed, first.residuals([f.x for f in followed], _even(weights), scale), strict=True)
-    ]
+    scale = min(one.scale for one in followed)
+    ends = first.residuals([one.x for one in followed], first.even, scale)
+    values = [first.value(one.x, r) for one, r in zip(followed, ends, strict=True)]
     best = followed[int(np.argmin(values))]
     whole = Problem(tuple(free), {}, tuple(evidence), solver)
     known = dict(zip((u.name for u in slippery), best.x, strict=False))
@@ -76,11 +74,10 @@ def roll_fitted(one: Evidence, friction: float, solver: SolverConfig) -> Fit:
     still = replace(problem, held={FRICTION: 0.0})
     means, _ = problem.prior
     xs = [np.where(np.arange(len(means)) == OWN - 1, roll, means) for roll in ROLLS_DEG]
-    even = [np.ones(len(one.trial.seen))]
-    found = np.array([float(own[0] @ own[0]) for own in still.residuals(xs, even, 1.0)])
+    found = np.array([float(own[0] @ own[0]) for own in still.residuals(xs, still.even, 1.0)])
     solved = [problem.solved(xs[k]) for k in _valleys(found)]
     scale = min(one.scale for one in solved)
-    ends = problem.residuals([one.x for one in solved], even, scale)
+    ends = problem.residuals([one.x for one in solved], problem.even, scale)
     values = [problem.value(one.x, r) for one, r in zip(solved, ends, strict=True)]
     starts = [(float(one.x[OWN - 1]), float(value)) for one, value in zip(solved, values, strict=True)]
     return Fit(problem, solved[int(np.argmin(values))], tuple(starts))
@@ -110,14 +107,10 @@ def _valleys(values: Array) -> list[int]:
     return sorted(low, key=lambda k: float(values[k]))[:MOST_STARTS]
 
 
-def _even(weights: Sequence[Array]) -> list[Array]:
-    return [np.ones_like(w) for w in weights]
-
-
 def _starts(problem: Problem) -> list[Array]:
     """Vectors to begin with: everything as stated, but rolls from where the objective has its lowest local minima."""
     means, _ = problem.prior
-    if all(np.all(np.asarray(one.trial.wire.rest_curvature_per_mm) == 0.0) for one in problem.evidence):
+    if not any(one.trial.wire.curved for one in problem.evidence):
         return [means]
     at = [u.name for u in problem.free].index(ROLL)
     xs = []
@@ -127,8 +120,7 @@ def _starts(problem: Problem) -> list[Array]:
         for one, part in zip(problem.evidence, problem.parts, strict=True):
             x[part[OWN - 1]] = roll if one.trial.roll_free else 0.0
         xs.append(x)
-    even = [np.ones(len(one.trial.seen)) for one in problem.evidence]
-    found = problem.residuals(xs, even, 1.0)
+    found = problem.residuals(xs, problem.even, 1.0)
     each = np.array([[float(r @ r) for r in own] for own in found])
     free = np.array([one.trial.roll_free for one in problem.evidence])
     together = each[:, ~free].sum(axis=1)

@@ -11,11 +11,11 @@ from typing import NamedTuple
 import numpy as np
 
 from pipeline.calibrate.search import Fit
-from pipeline.calibrate.trials import OWN, lengths_of, replayed
+from pipeline.calibrate.trials import OWN, replayed
 from pipeline.calibrate.unknowns import ROLL
 from pipeline.model import Wire
 from pipeline.simulate.config import SolverConfig
-from pipeline.simulate.resolution import AGREED_MM, moved_mm
+from pipeline.simulate.resolution import AGREED_MM, lengths_mm, moved_mm
 from solver import Solution
 
 MOST_SD = 1.0
@@ -34,7 +34,8 @@ class Segments(NamedTuple):
 
 def resolved(fit_with: Callable[[SolverConfig], Fit], wire: Wire, solver: SolverConfig) -> tuple[Fit, Segments]:
     """The fit to insertions of a wire with segments as short as it needs. fit_with : called with the settings."""
-    lengths, at = lengths_of(wire, solver), 0
+    asked, at = solver.segment_mm, 0
+    lengths = lengths_mm(asked, wire.rest_curvature_per_mm) if asked == "auto" else [asked]
     while True:
         fit = fit_with(solver.quick(lengths[at]))
         if len(lengths) == 1:

@@ -8,9 +8,8 @@ import numpy as np
 from pipeline.calibrate.unknowns import FRICTION, ROLL, bent, wall_factor
 from pipeline.model import Array, Clamp, OverWire, Wall, Wire
 from pipeline.simulate import inserted, together
-from pipeline.simulate.clamp import STEP_MM, STEP_RAD, TIP_VOXELS, Prior, TracedFrame, depth_from, moved
+from pipeline.simulate.clamp import STEP_MM, STEP_RAD, TIP_VOXELS, Prior, TracedFrame, depths_from, moved
 from pipeline.simulate.config import SolverConfig
-from pipeline.simulate.resolution import lengths_mm
 from pipeline.simulate.way import Stop, Way
 from solver import Insertion, Solution, VesselWall
 
@@ -74,8 +73,7 @@ class Point:
 
 def depths_at(trial: Trial, point: Point) -> list[float]:
     """Depth of each frame, mm from the clamp."""
-    clamp = moved(trial.given, point.own[:5])
-    return [max(depth_from(clamp, f.curve) + d, 0.1) for f, d in zip(trial.seen, point.own[OWN:], strict=True)]
+    return depths_from(moved(trial.given, point.own[:5]), trial.seen, point.own[OWN:])
 
 
 def insertion_at(trial: Trial, point: Point, solver: SolverConfig) -> Insertion:
@@ -85,11 +83,6 @@ def insertion_at(trial: Trial, point: Point, solver: SolverConfig) -> Insertion:
     # a wall that is nearer by some length is the same as a wire with a radius larger by it
     wire = replace(trial.wire, radius_mm=max(trial.wire.radius_mm + float(point.own[5]), 1e-3))
     return inserted(vessel, bent(wire, point.shared), moved(trial.given, point.own[:5]), solver, 1.0, trial.catheter)
-
-
-def lengths_of(wire: Wire, solver: SolverConfig) -> list[float]:
-    """Segment lengths to fit with, mm, each half of the one before; the stated one alone, where one is."""
-    return lengths_mm("auto", wire.rest_curvature_per_mm) if solver.segment_mm == "auto" else [solver.segment_mm]
 
 
 def way_at(trial: Trial, point: Point) -> Way:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.model import Wire
-from pipeline.ranges import Profile
+from pipeline.ranges import Profile, scaled
 
 MOST_CURVED = 4.0
 """Largest factor on the rest curvature that is tried."""
@@ -97,12 +97,7 @@ def bent(wire: Wire, values: Mapping[str, float]) -> Wire:
         reach = np.log(ei[-1] / ei[0])
         share = np.log(ei / ei[0]) / reach if reach else np.zeros(len(ei))
         changed = [(float(s), float(value)) for s, value in zip(at, ei * scale * shaft**share, strict=True)]
-    curved: Profile
-    if isinstance(curvature, (int, float)):
-        curved = float(curvature * rest)
-    else:
-        curved = [(s, float(value * rest)) for s, value in curvature]
-    return replace(wire, bending_stiffness_N_mm2=changed, rest_curvature_per_mm=curved)
+    return replace(wire, bending_stiffness_N_mm2=changed, rest_curvature_per_mm=scaled(curvature, rest))
 
 
 def lacking(wire: Wire) -> dict[str, tuple[str, str]]:
@@ -115,8 +110,7 @@ def lacking(wire: Wire) -> dict[str, tuple[str, str]]:
     if stiffness.ndim == 0 or stiffness[0, 1] == stiffness[-1, 1]:
         why = "the wire is stated as stiff at its tip as at its shaft: no scan tells a factor between them"
         found[TAPER] = why, "state bending_stiffness_N_mm2 as [distance from the tip, EI] pairs that rise to the shaft"
-    curvature = np.array(wire.rest_curvature_per_mm, dtype=float)
-    if not np.any(curvature if curvature.ndim == 0 else curvature[:, 1]):
+    if not wire.curved:
         why, do = (
             "the wire is stated straight: no scan tells",
             "state rest_curvature_per_mm if the real tip is curved",

@@ -112,7 +112,7 @@ def require_data(head: Head, most_gib: float, *, whole: bool = True) -> Head:
 def read_box(head: Head, item: int, box: Box, channel: int = 0) -> NDArray[Any]:
     """Grey values of a box of one volume, indexed x, y, z (x fastest in memory)."""
     try:
-        stored = _text(head, item, box) if head.packing == "ascii" else _stored(head, item, box, channel)
+        stored = _text(head, item, box, channel) if head.packing == "ascii" else _stored(head, item, box, channel)
     except (EOFError, zlib.error, OSError, ValueError) as error:
         what = "they end too early" if isinstance(error, EOFError) else "the packed data are damaged"
         why = f"the voxels cannot be read: {what}. The file may be cut short; copy it again."
@@ -157,7 +157,7 @@ def _fill(file: IO[bytes], rows: NDArray[Any]) -> None:
         done += step
 
 
-def _text(head: Head, item: int, box: Box) -> NDArray[Any]:
+def _text(head: Head, item: int, box: Box, channel: int) -> NDArray[Any]:
     """A box of voxels that are written out as text; the whole file is read. LoadError where one is not of its type."""
     count = int(np.prod(head.shape)) * head.items * head.channels
     with unpacked(head.parts[0][0], "", head.parts[0][1]) as file:
@@ -175,7 +175,7 @@ def _text(head: Head, item: int, box: Box) -> NDArray[Any]:
     if bad.any():
         raise unusable(head.path, f"voxels of {values[bad][0]:g} are written out; allowed: {allowed}; save it again")
     values = values.astype(kind)
-    volume = values.reshape(head.items, *head.shape[::-1], head.channels)[item, ..., 0].T
+    volume = values.reshape(head.items, *head.shape[::-1], head.channels)[item, ..., channel].T
     return volume[tuple(slice(a, b) for a, b in zip(*box, strict=True))]
 
 

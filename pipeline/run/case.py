@@ -93,19 +93,19 @@ def clear(folder: Path) -> str:
     return f"not of a run, and kept: {listed(kept)}" * bool(kept)
 
 
-def finished(job: Job, key: str) -> bool:
-    """Whether the result on disk is ok, has this key, and its data files are unchanged; pages may be missing."""
-    return _why_again(job, lambda: key) is None
-
-
-def _why_again(job: Job, key: Callable[[], str]) -> str | None:
+def why_again(job: Job, hashed: Callable[[], None] = nothing) -> str | None:
     """Why a case must be computed: None where it need not be, empty where the reason needs no words.
 
-    key : asked for where there is a ledger, since all scans are hashed for it.
+    It need not be where the result on disk is ok, has this key, and its data files are unchanged; pages may be missing.
+    hashed : called where there is a ledger, since the key needs all scans hashed.
     """
     known = None if job.fresh else ledger.read(job.folder)
-    if job.fresh or not results.has_ended(job.folder) or (known is not None and known.key != key()):
+    if job.fresh or not results.has_ended(job.folder):
         return ""
+    if known is not None:
+        hashed()
+        if known.key != job.key:
+            return ""
     found = results.found_in(job.folder, mine=True)
     if found.status == "damaged":
         wrong, _, _ = str(found.failures[0]["message"]).rpartition("; ")
@@ -121,12 +121,7 @@ def run_case(job: Job) -> None:
     progress = CaseProgress(job.label, job.folder / "log.txt", quiet=job.quiet, verbose=job.verbose)
     inputs = Inputs.of(job.case)
     with hashing(_files(job.case), job.cores) as hashed, held(job.folder, progress.warn):
-
-        def key() -> str:
-            hashed()
-            return job.key
-
-        again = _why_again(job, key)
+        again = why_again(job, hashed)
         if again is None:
             _heal(job, progress)
             return

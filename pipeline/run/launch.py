@@ -15,7 +15,7 @@ from pipeline.run import ledger
 from pipeline.run.aggregate import Totals, aggregate
 from pipeline.run.batch import elsewhere, run_all
 from pipeline.run.cache import Store, forget_lumen
-from pipeline.run.case import Job, clear, each_on, finished, run_case
+from pipeline.run.case import Job, clear, each_on, run_case, why_again
 from pipeline.run.earlier import remove_arrays, remove_others, remove_over_all, remove_records
 from pipeline.run.gate import Gate
 from pipeline.run.guards import guard_own
@@ -268,7 +268,7 @@ def intention(plan: Plan) -> list[str]:
     """What a run would do, a line each."""
     lines = []
     for job in plan.jobs:
-        known = "kept, nothing changed" if finished(job, job.key) else f"to run until {job.until}"
+        known = "kept, nothing changed" if why_again(job) is None else f"to run until {job.until}"
         frames = counted(frames_of(job.case, job.settings.config), "frame")
         lines.append(f"{job.case.id}: {frames}, {known} -> {job.folder}")
     lines += [f"{case.id}: left out: {why}" for case, why in plan.refused]

@@ -4,11 +4,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import lru_cache
 
-import numpy as np
-from numpy.typing import NDArray
-
 from pipeline.model import Clamp, Lumen, OverWire, Wall, Wire
-from pipeline.ranges import Profile
+from pipeline.ranges import scaled
 from pipeline.simulate.config import COARSEST_MM, Segment, SimulateConfig, SolverConfig
 from pipeline.simulate.way import Way
 from solver import Catheter, Grid, GuideWire, Insertion, Insertions, Solution, VesselWall
@@ -20,23 +17,12 @@ LEVELS = ("wall_look_ups_done_fraction", "start_energy_N_mm")
 """Entries of ``Solution.work`` that do not add up over frames."""
 
 
-def _scaled(profile: Profile, factor: float) -> float | NDArray[np.float64]:
-    """A profile as the solver takes it, its values times ``factor``."""
-    if isinstance(profile, (int, float)):
-        return profile * factor
-    return np.array(profile, dtype=np.float64) * (1.0, factor)
-
-
 def altered(wire: Wire, config: SimulateConfig) -> Wire:
     """The manifest's wire with another taper and another rest curvature, as a sensitivity run asks for."""
     stiffness = wire.bending_stiffness_N_mm2
     if not isinstance(stiffness, (int, float)):
         stiffness = [(distance * config.taper_scale, value) for distance, value in stiffness]
-    curvature = wire.rest_curvature_per_mm
-    if isinstance(curvature, (int, float)):
-        curvature *= config.rest_curvature_scale
-    else:
-        curvature = [(distance, value * config.rest_curvature_scale) for distance, value in curvature]
+    curvature = scaled(wire.rest_curvature_per_mm, config.rest_curvature_scale)
     return replace(wire, bending_stiffness_N_mm2=stiffness, rest_curvature_per_mm=curvature)
 
 
@@ -45,8 +31,8 @@ def guide_wire(wire: Wire, segment_mm: Segment, bending_scale: float = 1.0) -> G
     return GuideWire(
         segment_mm=COARSEST_MM if segment_mm == "auto" else segment_mm,
         radius_mm=wire.radius_mm,
-        bending_stiffness_N_mm2=_scaled(wire.bending_stiffness_N_mm2, bending_scale),
-        rest_curvature_per_mm=_scaled(wire.rest_curvature_per_mm, 1.0),
+        bending_stiffness_N_mm2=scaled(wire.bending_stiffness_N_mm2, bending_scale),
+        rest_curvature_per_mm=wire.rest_curvature_per_mm,
         torsional_stiffness_N_mm2=wire.torsional_stiffness_N_mm2,
         weight_N_per_mm=wire.weight_N_per_mm,
     )

@@ -85,6 +85,11 @@ def depth_from(clamp: Clamp, curve: Curve) -> float:
     return curve.length_mm + ahead_of(clamp, curve)
 
 
+def depths_from(clamp: Clamp, seen: Sequence[TracedFrame], off_mm: Array) -> list[float]:
+    """Depths of frames whose traces are off by ``off_mm`` (frames,) along the wire, mm from a clamp."""
+    return [max(depth_from(clamp, frame.curve) + off, 0.1) for frame, off in zip(seen, off_mm, strict=True)]
+
+
 def axes_of(direction: Array) -> Array:
     """Rows (3, 3): the direction, and two axes across it."""
     return np.array([direction, *across(direction)])
@@ -177,7 +182,7 @@ class _Fit:
     def too_coarse(self, at: Array, shorter: Replay) -> bool:
         """Whether wires of shorter segments lie elsewhere where they are fitted, at values (5 + frames,)."""
         clamp = moved(self.given, at[:5])
-        depths = [max(depth_from(clamp, f.curve) + d, 0.1) for f, d in zip(self.seen, at[5:], strict=True)]
+        depths = depths_from(clamp, self.seen, at[5:])
         long, short = (replay([clamp], self.seen, [depths])[0] for replay in (self.replay, shorter))
         pairs = [(a, b, t.arc_mm) for a, b, t in zip(long, short, self.traces, strict=True) if _at_rest(a, b)]
         apart = [at_arc(a.joints_mm, arc) - at_arc(b.joints_mm, arc) for a, b, arc in pairs if len(arc)]
@@ -188,8 +193,7 @@ class _Fit:
         steps = np.array([STEP_MM] * 3 + [STEP_RAD] * 2 + [STEP_DEPTH_MM])
         clamps = [moved(self.given, at[:5] + d) for d in (np.zeros(5), *np.diag(steps[:5]), np.zeros(5))]
         more = at[5:] + np.array([0.0] * 6 + [STEP_DEPTH_MM])[:, None]
-        pairs = zip(clamps, more, strict=True)
-        depths = [[max(depth_from(c, f.curve) + d, 0.1) for f, d in zip(self.seen, m, strict=True)] for c, m in pairs]
+        depths = [depths_from(clamp, self.seen, off) for clamp, off in zip(clamps, more, strict=True)]
         wires = self.replay(clamps, self.seen, depths)
         residual, jacobian, good = [], [], np.zeros(len(self.seen), bool)
         for i, trace in enumerate(self.traces):

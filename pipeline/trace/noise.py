@@ -7,6 +7,7 @@ from scipy.special import ndtr
 
 from pipeline.arrays.grids import unflattened
 from pipeline.model import Array
+from pipeline.trace.region import HALO_VOXELS
 from pipeline.trace.subtraction import Subtraction
 from pipeline.trace.tube import Tube
 
@@ -82,7 +83,9 @@ def _patches(image: Subtraction, tube: Tube, index: NDArray[np.int64]) -> tuple[
     at = (i[:, :, None, None], j[:, None, :, None], k[:, None, None, :])
     with image.showing(tube.voxels, tube.rest):
         patches = image.grey[at]
-    return patches, np.asarray(np.mean(patches != 0, axis=(1, 2, 3)))
+    # not by grey that is 0: of whole greys much of the noise is
+    box = image.region.box
+    return patches, np.asarray(np.mean(box.values[at] < HALO_VOXELS * np.min(box.spacing_mm), axis=(1, 2, 3)))
 
 
 def inflation(image: Subtraction, curve: Array, tube: Tube) -> tuple[Array, Array]:

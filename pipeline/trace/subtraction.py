@@ -50,16 +50,16 @@ UNEVEN = 0.82
 class Subtraction:
     """Grey above the background (float32, on the region's box, valid on ``region.runs``) and its noise.
 
-    noise : robust standard deviation of one voxel.  modelled : True where no reference scan was there to subtract, or
-    one of another contrast.  wall_blur_mm : the scanner's.  scan : the frame, in the order of the box's axes.  uneven :
-    the lumen's contrast changes so much along it that no wire is found before that is taken away.
+    noise : robust standard deviation of one voxel.  without_reference : there was no reference scan, or none
+    with less noise than the frame alone.  wall_blur_mm : the scanner's.  scan : the frame, in the order of the box's
+    axes.  uneven : the lumen's contrast changes so much along it that no wire is found before that is taken away.
     Points and directions are in kernel coordinates: index along the box's axes times ``spacing``.
     """
 
     region: SearchRegion
     grey: NDArray[np.float32]
     noise: float
-    modelled: bool
+    without_reference: bool
     wall_blur_mm: float
     scan: Grid
     uneven: bool = False
@@ -85,9 +85,9 @@ class Subtraction:
         return float(self.spacing.min())
 
     @property
-    def without_reference(self) -> bool:
-        """Whether no reference scan was there, or none that shows less noise than the frame alone."""
-        return self.modelled and self.levels["gain"] == 1.0  # to the bit, where nothing was matched
+    def modelled(self) -> bool:
+        """Whether the background is a model's in part: without a reference scan, or with one of another contrast."""
+        return self.without_reference or self.levels["gain"] != 1.0
 
     @property
     def thick_slices(self) -> bool:
@@ -199,11 +199,9 @@ def subtracted(frame: Volume, lumen: Lumen, reference: Volume | None) -> Subtrac
     total, read = float(np.prod(grid.shape)), float(np.sum(region.runs[:, 3] - region.runs[:, 2]))
     counters = {"voxels_total": total, "voxels_read": read, "voxels_skipped": total - read}
     blur = wall_blur(lumen, float(np.min(region.box.spacing_mm)))
-    modelled, levels = reference is None or gain != 1.0, {"noise": noise, "gain": gain}
-    if copied:
-        levels["copied"] = copied
-    uneven = modelled and lumen.levels.get("least_filling", 1.0) < UNEVEN
-    return Subtraction(region, grey, max(noise, 1e-6), modelled, blur, grid, uneven, counters, levels)
+    levels = {"noise": noise, "gain": gain} | ({"copied": copied} if copied else {})
+    image = Subtraction(region, grey, max(noise, 1e-6), reference is None, blur, grid, counters=counters, levels=levels)
+    return replace(image, uneven=image.modelled and lumen.levels.get("least_filling", 1.0) < UNEVEN)
 
 
 @contextmanager

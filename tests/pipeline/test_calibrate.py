@@ -21,7 +21,7 @@ from pipeline.calibrate.design import predicted, straight_to
 from pipeline.calibrate.estimates import Estimate, _followed, _judged, calibrated
 from pipeline.calibrate.fit import Problem
 from pipeline.calibrate.residuals import Evidence, weights_of
-from pipeline.calibrate.search import Fit, own_roll, roll_fitted
+from pipeline.calibrate.search import Fit, fitted, own_roll, roll_fitted
 from pipeline.calibrate.trials import OWN, Point, Trial, replayed
 from pipeline.calibrate.unknowns import BENDING, FRICTION, REST, ROLL, TAPER, bent, lacking, spread_in_words, unknowns
 from pipeline.cli import main
@@ -253,6 +253,13 @@ def test_a_straight_uniform_wire_shows_no_roll_and_no_taper():
     assert all(fit.values[name] == 0.0 for name in (ROLL, REST, TAPER))
 
 
+def test_a_straight_wire_is_followed_from_one_roll_however_it_is_stated():
+    """Stated as pairs its distances counted as curvature: 24 rolls were tried, and three starts followed to one end."""
+    for straight in (0.0, [(0.0, 0.0), (8.0, 0.0)]):
+        one = trial(replace(WIRE, rest_curvature_per_mm=straight), depths=(10.0, 16.0))
+        assert len(fitted(all_of(one), [Evidence(one)], SETTINGS).starts) == 1
+
+
 def test_a_wire_is_told_what_it_is_stated_without():
     """To see the taper of a wire of one stiffness, "deeper insertions" were recommended."""
     assert lacking(WIRE) == {}
@@ -291,7 +298,7 @@ def test_what_follows_in_a_profile_stays_within_its_bounds():
     normal = np.linalg.inv(together * np.outer(deviations, deviations))
     root, low = np.linalg.cholesky(normal).T, np.array([-1.0, 0.0, -np.inf])
     problem: Any = SimpleNamespace(
-        prior=(np.zeros(3), np.full(3, np.inf)), clipped=lambda x: np.maximum(x, low), value=lambda _, r: r[0] @ r[0]
+        prior=(np.zeros(3), np.full(3, np.inf)), precision=0.0, clipped=lambda x: np.maximum(x, low)
     )
     linear: Any = SimpleNamespace(normal=normal, jacobian=[root])
     for taper in (0.16, -0.16):
@@ -308,7 +315,8 @@ def test_what_follows_in_a_profile_stays_within_its_bounds():
 
 def test_nothing_follows_residuals_that_are_no_numbers():
     """A profile that met one never ended."""
-    problem: Any = SimpleNamespace(prior=(np.zeros(2), np.full(2, np.inf)), clipped=lambda x: np.maximum(x, -1.0))
+    prior = np.zeros(2), np.full(2, np.inf)
+    problem: Any = SimpleNamespace(prior=prior, precision=0.0, clipped=lambda x: np.maximum(x, -1.0))
     linear: Any = SimpleNamespace(normal=np.eye(2), jacobian=[np.eye(2)])
     start = np.array([0.1, 0.2])
     assert np.array_equal(_followed(problem, linear, 0, start, [np.full(2, np.nan)]), start)

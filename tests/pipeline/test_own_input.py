@@ -228,12 +228,15 @@ def test_layers_and_names_of_a_segmentation(tmp_path):
         mask(tmp_path / "s.seg.nrrd")
     with pytest.raises(LoadError, match="did you mean 'artery'"):
         mask(tmp_path / "s.seg.nrrd", label="atery")
+    written = " ".join(map(str, both.ravel(order="F"))).encode()
+    (tmp_path / "u.seg.nrrd").write_bytes(head.replace(": raw", ": ascii").encode() + b"\n" + written)
     both_artery = head.replace("Name:=core", "Name:=artery")
     (tmp_path / "t.seg.nrrd").write_bytes(both_artery.encode() + b"\n" + both.tobytes(order="F"))
     with pytest.raises(LoadError, match="labels 1 and 5, all named 'artery'"):
         mask(tmp_path / "t.seg.nrrd", label="artery")
-    by_number = [mask(tmp_path / f"{name}.seg.nrrd", label=5).distance.values for name in "st"]
-    np.testing.assert_array_equal(*by_number)
+    by_number, *others = (mask(tmp_path / f"{name}.seg.nrrd", label=5).distance.values for name in "stu")
+    for values in others:
+        np.testing.assert_array_equal(values, by_number)
 
 
 def test_a_centreline_of_vmtk(tmp_path):

@@ -19,7 +19,7 @@ from pipeline.compare.metrics import Pair
 from pipeline.compare.nulls import Clues, PredictorInputs
 from pipeline.model import Array
 from pipeline.run import ledger
-from pipeline.run.case import Job, finished
+from pipeline.run.case import Job, why_again
 from pipeline.run.own import not_loaded, refuse_scripts, registered, with_own
 from pipeline.status import UsageError
 from pipeline.study.manifest import read_manifest
@@ -50,12 +50,13 @@ def test_a_metric_that_raises_is_named() -> None:
 
 def test_results_of_own_functions_are_not_kept(as_before: None, tmp_path: Path) -> None:
     """What they close over, a partial's values and the modules that they call may have changed unseen."""
-    out = write_run(tmp_path, (FakeCase("tube"),))
-    ledger.write(out / "cases" / "tube", "key")
+    folder = write_run(tmp_path, (FakeCase("tube"),)) / "cases" / "tube"
     job = job_of(tmp_path)
-    assert finished(job, "key")
+    ledger.write(folder, job.key)
+    assert why_again(job) is None
     metrics.register(Column("own_mm", "mm", "mine"), partial(metrics.distal_rms, length_mm=5.0))
-    assert not finished(job, "key")
+    ledger.write(folder, job.key)
+    assert "results of functions of your own (own_mm) are never kept" in (why_again(job) or "")
 
 
 def test_workers_have_what_a_module_registers_or_it_is_refused(as_before: None) -> None:

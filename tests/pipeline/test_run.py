@@ -192,7 +192,11 @@ def test_fewer_stages_do_not_wipe_what_is_finished(
     assert run(study, out) == 0
 
 
-def test_dry_run_computes_nothing(study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_dry_run_computes_nothing(
+    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It read every scan for a key that only a result which is kept is asked for."""
+    monkeypatch.setattr("pipeline.run.store.file_hash", lambda path: pytest.fail(f"reads {path}"))
     assert run(study, tmp_path / "out", "--dry-run", "--sweep", "simulate.wall_scale=0.5,2") == 0
     assert "sweep simulate.wall_scale = 0.5" in capsys.readouterr().out
     assert not (tmp_path / "out").exists()

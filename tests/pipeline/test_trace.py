@@ -322,6 +322,24 @@ def test_correlated_noise_that_hides_the_wire_is_a_named_status():
         assert curve.status is FrameStatus.NO_WIRE
 
 
+def test_noise_of_a_grey_is_as_correlated_in_whole_greys():
+    """Of an 8 bit export with a noise of one grey the sigma was half of what it is: greys of 0 passed for not read."""
+    origin, empty, wired, _, *entry = vessel()
+    rng = np.random.default_rng(0)
+    fields = [ndimage.gaussian_filter(rng.normal(size=wired.shape), 1.0) for _ in range(2)]
+    greys = [
+        ndimage.gaussian_filter(v, 0.8) * 12.0 / PEAK + n / n.std() for v, n in zip((wired, empty), fields, strict=True)
+    ]
+    lumen = segment(scans(8)[1], entry[0][None])
+    found = []
+    for kind in (np.asarray, lambda v: np.rint(v).astype(np.int16)):
+        frame, reference = (Volume(np.asfortranarray(kind(v)), [VOXEL] * 3, origin) for v in greys)
+        found.append(trace(frame, lumen, *entry, reference=reference))
+    real, whole = found
+    assert real.levels["inflation"] > 2.0
+    assert 0.9 < np.median(whole.sigma_mm) / np.median(real.sigma_mm) < 1.3, "rounding adds a twelfth to the variance"
+
+
 def test_points_nearly_parallel_to_the_rotation_plane_are_marked():
     frame, reference, lumen = scans(8)
     _, _, _, wire, entry, direction = vessel()
