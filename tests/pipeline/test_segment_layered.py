@@ -10,6 +10,7 @@ from pipeline.arrays.edges import layer_in
 from pipeline.model import Lumen, Volume
 from pipeline.segment import segment
 from pipeline.segment.shown import beside_the_wall
+from pipeline.status import StageError
 from solver.grid import Grid
 from tests.later import later
 from tests.pipeline import phantoms
@@ -28,6 +29,11 @@ def phantom(greys, thick_mm, noise=25.0, seed=1):
     clean = beyond + (layer - beyond) * phantoms.partial_volume(distance - thick_mm, VOXEL)
     clean += (vessel - layer) * phantoms.partial_volume(distance, VOXEL)
     return Volume(phantoms.scan(clean, 0.7, noise, seed), [VOXEL] * 3, origin), curve, distance
+
+
+def seeded(found):
+    scan, curve, _ = found
+    return scan, curve[[200]]
 
 
 def test_a_vessel_along_the_voxels_has_no_layer():
@@ -64,6 +70,36 @@ def test_a_block_of_silicone_is_no_layer(greys, thick_mm):
     lumen = segment(scan, curve[[200]])
     assert abs(np.median(wall_error(lumen, curve, RADIUS))) < 0.1
     assert not any("a layer of grey" in warning for warning in lumen.warnings)
+
+
+@pytest.mark.parametrize(
+    ("greys", "thick_mm", "noise"), [((400.0, 300.0, -1000.0), 4.0, 20.0), ((600.0, 300.0, 0.0), 3.0, 60.0)]
+)
+def test_a_vessel_in_resin_of_nearly_its_grey_is_no_part_of_the_resin(greys, thick_mm, noise):
+    """Resin at 0.8 to 0.9 of the contrast with air was the lumen, 10 to 15 voxels wide, and nothing said so."""
+    scan, curve, _ = phantom(greys, thick_mm, noise)
+    lumen = segment(scan, curve[[200]])
+    off = wall_error(lumen, curve, RADIUS)
+    assert abs(np.median(off)) < 0.1
+    assert np.percentile(np.abs(off), 95) < 0.5
+    assert any("of grey 30" in warning and "that surrounds the vessel" in warning for warning in lumen.warnings)
+
+
+@pytest.mark.parametrize("greys", [(150.0, 300.0, -1000.0), (400.0, 300.0, -1000.0)])
+def test_a_vessel_darker_than_the_resin_or_hardly_brighter_is_refused(greys):
+    with pytest.raises(StageError, match="expected a lumen brighter than its surroundings by twice the noise"):
+        segment(*seeded(phantom(greys, 3.0, 60.0)))
+
+
+@pytest.mark.parametrize("least", [0.6, 0.8])
+def test_a_part_that_is_filled_less_surrounds_nothing(least):
+    """Half of the vessel along its way, or half of it across, as medium that has settled."""
+    scan, curve, distance = phantom((900.0, 100.0, 98.0), 1.0)
+    place = scan.origin_mm + VOXEL * np.moveaxis(np.indices(scan.values.shape), 0, -1)
+    for part in (place[..., 2] > curve[:, 2].mean(), place[..., 0] > curve[200, 0]):
+        less = np.where(part & (distance < 0.0), (1.0 - least) * 800.0, 0.0)
+        lumen = segment(Volume(scan.values - less, scan.spacing_mm, scan.origin_mm), curve[[200]])
+        assert not any("that surrounds the vessel" in warning for warning in lumen.warnings)
 
 
 @pytest.mark.parametrize(("larger_mm", "said"), [(0.0, ""), (0.6, "outside the wall that the scan shows")])
