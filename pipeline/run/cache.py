@@ -28,8 +28,8 @@ DEFAULT_LIMIT = 20 * 2**30
 """Bytes: the lumens of about a thousand scans of 256^3 voxels."""
 ABANDONED_S = 86400.0
 """Age in seconds from which a temporary file is taken to be left over from a run that was killed."""
-OURS = re.compile(r"[0-9a-f]{64}\.(result|npz)|\.tmp-.*\.result")
-"""Names of files of the store; .npz is how it wrote them before they had a hash."""
+OURS = re.compile(r"[0-9a-f]{64}\.result|\.tmp-.*\.result")
+"""Names of files of the store."""
 NOT_A_RESULT = (ValueError, KeyError, TypeError, EOFError, BadZipFile)
 
 _lumen: dict[Path, Lumen] = {}

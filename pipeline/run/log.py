@@ -5,6 +5,7 @@ from collections import defaultdict
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from time import perf_counter
 from typing import Any, Literal, TextIO
@@ -33,12 +34,12 @@ class Log:
 
     progress: Progress
     seconds: dict[str, float] = field(default_factory=lambda: dict.fromkeys((*TIMED, "report"), 0.0))
-    frame_seconds: dict[tuple[int, str], float] = field(default_factory=dict)
+    frame_seconds: dict[tuple[int, str], float] = field(default_factory=partial(defaultdict, float))
     assumptions: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
     of_wires: list[str] = field(default_factory=list)
     chosen: dict[str, str] = field(default_factory=dict)
-    reused: dict[str, int] = field(default_factory=dict)
+    reused: dict[str, int] = field(default_factory=partial(defaultdict, int))
     _counts: dict[str, dict[str, float]] = field(default_factory=lambda: defaultdict(dict))
     _levels: dict[str, dict[str, list[float]]] = field(default_factory=lambda: defaultdict(dict))
 
@@ -59,7 +60,7 @@ class Log:
         """Add a time that was measured elsewhere."""
         self.seconds[stage] += seconds
         if frame is not None:
-            self.frame_seconds[frame, stage] = self.frame_seconds.get((frame, stage), 0.0) + seconds
+            self.frame_seconds[frame, stage] += seconds
 
     def count(self, stage: Stage, counters: Counters, levels: Levels | None = None) -> None:
         """Add a stage's counters to the case's, and note its levels."""
@@ -78,9 +79,9 @@ class Log:
         for stage, seconds in part.seconds.items():
             self.seconds[stage] += seconds
         for key, seconds in part.frame_seconds.items():
-            self.frame_seconds[key] = self.frame_seconds.get(key, 0.0) + seconds
+            self.frame_seconds[key] += seconds
         for stage, times in part.reused.items():
-            self.reused[stage] = self.reused.get(stage, 0) + times
+            self.reused[stage] += times
         self.assumptions += part.assumptions
         self.warnings += part.warnings
         self.chosen |= part.chosen

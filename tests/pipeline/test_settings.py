@@ -19,7 +19,7 @@ from pipeline.run.sweep import points_of, unchanged
 from pipeline.segment import segment
 from pipeline.segment.config import SegmentConfig
 from pipeline.status import FrameStatus
-from pipeline.study.settings import Config, SettingsError, parse_assignment, read_settings, resolve, to_toml
+from pipeline.study.settings import SettingsError, parse_assignment, read_settings, resolve, to_toml
 from pipeline.trace import trace
 from solver._compile import hash_of
 from solver.grid import Grid
@@ -85,7 +85,6 @@ def test_keys_follow_contents_and_settings_not_paths(tmp_path: Path) -> None:
     assert first != key_of(segment, a, SegmentConfig(threshold=0.123))
     assert first != key_of(trace, a, SegmentConfig())
     assert key_of(segment, np.array([1.0])) != key_of(segment, np.array([1.0 + 1e-15 * 4]))
-    assert Config() == Config()
 
 
 def test_keys_follow_the_code_that_reads_and_the_libraries(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -24,6 +24,7 @@ from pipeline.simulate.resolution import AGREED_MM
 from pipeline.status import FrameStatus, StageError
 from pipeline.study.manifest import Case
 from pipeline.study.settings import Config
+from reports.case_files import GOOD
 from reports.frames_file import ScanCrop, Straightened
 from solver import Solution, Status
 
@@ -75,8 +76,7 @@ class Frame:
     @property
     def ok(self) -> bool:
         """Whether it was traced, simulated to its depth and compared, or only simulated, or used to fit the roll."""
-        good = FrameStatus.OK, FrameStatus.SIMULATED, FrameStatus.ROLL_FITTED
-        return self.status in (status.identifier for status in good)
+        return self.status in GOOD
 
     @property
     def traced(self) -> bool:
@@ -267,7 +267,7 @@ class Context:
                 self.store.put(stage, key, result)
         else:
             result = cast(Result, kept)
-            self.log.reused[stage] = self.log.reused.get(stage, 0) + 1
+            self.log.reused[stage] += 1
             for crop in (item for item in inputs if isinstance(item, Crop)):
                 self.log.count("load", crop.counters)
         # counted for stored results, too: a resumed run reports the same work as one that was not interrupted
