@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from pipeline.arrays.polyline import at_arc
 from pipeline.model import Array, arc_length
@@ -75,20 +75,24 @@ def resolve(insert: Insert, lengths: Sequence[float]) -> Resolved:
     reason, before = "no coarser segments can follow the wire's rest curvature: no estimate of their error", wires
     for shorter in lengths[1:]:
         finer = insert(shorter, True)
-        moved = np.array([moved_mm(a, b) for a, b in zip(before, finer, strict=True)])
-        pushed, before = _pushed_N(before, finer), finer
+        moved, pushed = _moved(before, finer)
+        before = finer
         if len(lengths) > 2 and _reached(finer) < _reached(wires):
             reason = "with shorter ones fewer depths are reached"
+            if np.isnan(num).all():  # what is left in the longer ones is a third more
+                num, push = _bounds(4.0 / 3.0 * moved, 4.0 / 3.0 * pushed)
             continue
         # a wire that is about to snap goes one way or the other for tiny causes, with segments of any length
         away = ~(moved <= AGREED_MM) & np.array([not wire.uncertain for wire in finer], dtype=bool)
         segment, wires = shorter, finer
-        # the wires that moved further snapped aside, and say nothing of other depths
-        num, push = (_bound(x, moved <= AGREED_MM, most) for x, most in ((moved, AGREED_MM), (pushed, np.inf)))
+        num, push = _bounds(moved, pushed)
         if not away.any():
             reason = f"halving them moved no wire by more than {AGREED_MM} mm, near snaps apart"
             break
-        reason = f"at {int(away.sum())} of {len(num)} depths the wire still depends on their length"
+        if np.isnan(moved[away]).all():
+            reason = f"at {int(away.sum())} of {len(num)} depths no wire came to rest, with shorter ones as with longer"
+        else:
+            reason = f"at {int(away.sum())} of {len(num)} depths the wire still depends on their length"
     if segment == lengths[0] and len(lengths) > 1:
         wires = insert(segment, True)
     return Resolved(segment, wires, num, push, reason)
@@ -102,24 +106,29 @@ def moved_mm(coarse: Solution, fine: Solution) -> float:
     return max(float(np.sqrt(np.mean(np.sum(apart**2, axis=1)))), SMALLEST_MM)
 
 
-def _bound(change: Array, alike: NDArray[np.bool_], largest: float) -> Array:
-    """What halving the segments changed, or twice its root mean square over depths where that is more, to ``largest``.
+def _moved(coarse: Sequence[Solution], fine: Sequence[Solution]) -> tuple[Array, Array]:
+    """How far the wires, mm, and their pushes, N, moved at each depth; NaN where one of both is not at rest.
 
-    Errors change their sign along the way, so that one depth's change is small by chance: alone it covered 85 % of the
-    errors in vessels drawn at random, the two together 97 %. alike : (depths,) which speak for others.
-    """
-    typical = change[alike]
-    return np.maximum(change, min(2.0 * float(np.sqrt(np.mean(typical**2))), largest)) if typical.size else change
-
-
-def _pushed_N(coarse: Sequence[Solution], fine: Sequence[Solution]) -> Array:
-    """How far the push moved, N, at each depth; NaN where one of both is not at rest.
-
-    In lumens with hardly any room it is the slope of the voxels' waves in the wall, and wrong by all of it.
+    In lumens with hardly any room the push is the slope of the voxels' waves in the wall, and wrong by all of it.
     """
     both = list(zip(coarse, fine, strict=True))
+    moved = np.array([moved_mm(*pair) for pair in both])
     at_rest = [a.converged and b.converged for a, b in both]
-    return np.where(at_rest, [abs(a.push_force_N - b.push_force_N) for a, b in both], np.nan)
+    return moved, np.where(at_rest, [abs(a.push_force_N - b.push_force_N) for a, b in both], np.nan)
+
+
+def _bounds(moved: Array, pushed: Array) -> tuple[Array, Array]:
+    """What halving the segments changed of wires, mm, and pushes, N, or twice its root mean square where that is more.
+
+    Errors change their sign along the way, so that one depth's change is small by chance: alone it covered 85 % of the
+    errors in vessels drawn at random, the two together 97 %. Of wires the root mean square counts to AGREED_MM; those
+    that moved further snapped aside, and say nothing of other depths.
+    """
+    alike = moved <= AGREED_MM
+    if not alike.any():
+        return moved, pushed
+    near, typical = (2.0 * float(np.sqrt(np.mean(change[alike] ** 2))) for change in (moved, pushed))
+    return np.maximum(moved, min(near, AGREED_MM)), np.maximum(pushed, typical)
 
 
 def _reached(wires: Sequence[Solution]) -> int:

@@ -109,13 +109,17 @@ def at_goal(at: Any, depth: float, roll: float) -> bool:
 def adapt_step(handle: Any, outcome: int, iterations: int, limit: float) -> tuple[bool, int]:
     """Whether to take another step after one with this outcome, and the outcome if not; adapts the step's length."""
     at = handle.place[0]
-    if iterations > limit or handle.problem.scratch.counters[0].passed >= handle.limits.work:
+    counters = handle.problem.scratch.counters[0]
+    if iterations > limit or counters.passed >= handle.limits.work:
         return False, data.MAX_ITERATIONS
     # without a finite energy a shorter step does not help. With friction, where several states are at rest, one out of
     # the grid may be a hop: shorter steps are tried down to the finest (a share of the longest)
     least = handle.introducer.finest if handle.problem.friction.coefficient > 0.0 else 1.0
     helps = at.shrink > (least if outcome == data.LEFT_GRID else tol.SMALLEST_STEP) and outcome != data.NON_FINITE
     if outcome == data.CONVERGED:
+        k, _ = segments_at(at.inserted, handle.table.segment)
+        free = tol.FREE_ITERATIONS * at.shrink * (k + handle.problem.chain.first[k + 1])
+        counters.passed = max(counters.passed - int(free), 0)
         at.waits = max(at.waits - 1, 0)
         at.shrink = min(1.0, 2 * at.shrink) if at.waits == 0 else at.shrink
     elif outcome == data.ROUGH:

@@ -119,6 +119,19 @@ def test_a_length_that_loses_depths_is_not_taken() -> None:
     assert "fewer depths" in apart.reason
 
 
+def test_a_depth_that_shorter_lengths_lose_leaves_the_others_their_bound() -> None:
+    """It took it from all: wires of 1 mm segments were 0.13 mm off, ok, without a word."""
+
+    def one(segment_mm: float, _: bool) -> Sequence[Solution]:
+        wires = insert(bend(20.0), segment_mm)
+        return wires if segment_mm > 0.6 else [*wires[:-1], replace(wires[-1], status=Status.STALLED)]
+
+    kept = resolve(one, lengths_mm("auto", 0.0))
+    assert kept.segment_mm == 1.0
+    assert np.all(np.isfinite(kept.num_mm[:-1] + kept.num_push_N[:-1]))
+    assert np.isnan(kept.num_mm[-1])
+
+
 def test_a_joint_that_cannot_follow_the_bend_is_no_result() -> None:
     """A soft tip behind a jump of 1:1000 goes round a U-turn by folding at a joint: at rest, and wrong."""
     tip = replace(siphon(), guide_wire=GuideWire(1.0, 0.18, np.array([[0.0, 0.01], [3.0, 0.01], [3.0, 10.0]])))

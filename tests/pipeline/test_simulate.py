@@ -11,7 +11,7 @@ import pytest
 
 from pipeline.cli import main
 from pipeline.model import Clamp, Lumen, OverWire
-from pipeline.run.stages.covered import too_thick
+from pipeline.run.stages.covered import along, too_thick
 from pipeline.run.stages.known import Frame
 from pipeline.run.stages.load import each_frame
 from pipeline.run.stages.simulate import _pressed_deep, judged
@@ -184,7 +184,7 @@ def test_a_wire_deep_in_a_soft_wall_is_told_and_one_that_presses_is_not() -> Non
     for stiffness in (1e-4, 20.0):
         insertion = Insertion(GuideWire(0.5, 0.18, 20.0), VesselWall(grid, stiffness), [0, 0, 0], [0.5, 0, 1.0])
         wires = [s for s in insertion.to_depths([2.0, 5.0, 6.0]) if s.converged]
-        told[stiffness] = _pressed_deep([Frame(n, simulated=w) for n, w in enumerate(wires)], wires, 0.18)
+        told[stiffness] = _pressed_deep([(Frame(n), wire) for n, wire in enumerate(wires)], 0.18)
     assert told[20.0] == []
     (sentence,) = told[1e-4]
     assert "2 frames" in sentence
@@ -227,14 +227,29 @@ def test_a_catheter_thicker_than_the_vessel_is_told_where_it_is_inserted() -> No
     insertion = Insertion(GuideWire(0.5, 0.18, 20.0), wall, [1.2, 0, 0], [0, 0, 1.0])
     wires = list(insertion.to_depths([10.0, 15.0]))
     for radius, tips, frames in ((7.0, (8.0, 12.0), 2), (2.2, (0.0, 12.0), 1), (7.0, (0.0, 0.0), 0)):
-        seen = [Frame(n, catheter_mm=tip) for n, tip in enumerate(tips)]
-        said = too_thick(OverWire(50.0, radius, tips), seen, wires, wall)
+        lines = {n: along(wire, tip) for n, (wire, tip) in enumerate(zip(wires, tips, strict=True))}
+        said = too_thick("catheter", radius, lines, wall)
         assert len(said) == bool(frames)
         assert not frames or f"{frames} frame" in said[0]
         assert not frames or f"radius_mm = {radius:g}, and in frame " in said[0]
         assert not frames or "the lumen has room for 1.4" in said[0]  # the middle lies between voxels of 0.3 mm
-    seen = [Frame(n, catheter_mm=8.0) for n in range(2)]
-    assert too_thick(OverWire(50.0, 1.5, 8.0), seen, wires, wall) == []
+    assert too_thick("catheter", 1.5, {n: along(wire, 8.0) for n, wire in enumerate(wires)}, wall) == []
+    assert too_thick("wire", 0.18, dict(enumerate(map(along, wires))), wall) == []
+
+
+def test_a_wire_thicker_than_the_vessel_is_told() -> None:
+    """One of 0.9 mm lay in a stenosis of 0.3 mm, ok, without a word: its wall gave way by less than its radius."""
+    axes = [np.arange(a, b, 0.25) for a, b in ((-3, 3.1), (-3, 3.1), (-3, 24))]
+    x, y, z = np.meshgrid(*axes, indexing="ij")
+    distance = np.hypot(x, y) - 1.5 + 1.4 * np.exp(-(((z - 10.0) / 3.0) ** 2))
+    wall = VesselWall(Grid(distance, np.full(3, 0.25), np.array([-3.0, -3.0, -3.0])), 2.0)
+    for radius, told in ((0.44, True), (0.18, False)):
+        (wire,) = Insertion(GuideWire(0.5, radius, 20.0), wall, [0, 0, 0], [0, 0, 1.0]).to_depths([18.0])
+        assert wire.converged
+        assert wire.max_penetration_mm < radius
+        said = too_thick("wire", radius, {3: along(wire)}, wall)
+        assert bool(said) == told
+        assert not told or said[0].startswith("1 frame: the wire is thicker than the vessel: radius_mm = 0.44, and in")
 
 
 def test_nothing_to_simulate_is_no_error() -> None:
@@ -253,7 +268,15 @@ def test_a_wire_that_runs_back_in_the_vessel_is_told_and_a_curled_tip_is_not() -
     back = np.stack([0.0 * out + 2.0, 0.0 * out, out[::-1]], axis=1)
     curls = np.concatenate([pushed, *[np.concatenate([bend, bend[::-1] * [1, 1, -1] + [0, 0, 80]])] * 3])
     wires = {0: pushed, 1: np.concatenate([pushed, bend, back[:60]]), 2: curls, 3: np.concatenate([pushed, bend])}
-    (said,) = turned_back(tube, np.zeros(3), wires)
-    assert said.startswith("1 frame (1): the simulated wire has turned round")
+    (said,) = turned_back(VesselWall(tube, 1.0), np.zeros(3), wires)
+    assert said.startswith("frame 1: the simulated wire has turned round")
     assert "in frame 1 from 42 mm along it by 31 mm" in said
-    assert turned_back(tube, np.zeros(3), {}) == []
+    assert turned_back(VesselWall(tube, 1.0), np.zeros(3), {}) == []
+    # a sac beside the entry made loops of all vessels as wide as it is
+    sac = np.sqrt((axes[0] - 6.0) ** 2 + axes[1] ** 2 + (axes[2] - 4.0) ** 2) - 5.5
+    wide = Grid(np.minimum(tube.values, sac), tube.spacing_mm, tube.origin_mm, tube.direction)
+    assert turned_back(VesselWall(wide, 1.0), np.zeros(3), wires) == [said]
+    # one that is held the wrong way round folds in the closed end behind its entry, and its tip is far ahead of that
+    behind = np.concatenate([pushed[60:0:-1], bend * [1, 1, -1] + [0, 0, 40], back[::-1]])
+    (said,) = turned_back(VesselWall(tube, 1.0), np.array([0.0, 0.0, 30.0]), {0: behind})
+    assert "runs back in the vessel, in frame 0" in said

@@ -1,61 +1,59 @@
-"""The stretch of a wire that a catheter covers: the solver takes the wire's radius there, never the catheter's."""
+"""Room for wires and for catheters over them: where one covers a wire, the solver takes the wire's radius."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 
 import numpy as np
 
 from pipeline.arrays.polyline import at_arc, samples
 from pipeline.model import Array, OverWire, arc_length
-from pipeline.run.stages.known import Frame
 from reports.case_files import counted
 from solver import Solution, VesselWall
 from solver.self_contact import self_overlap_mm
 
 STEP_MM = 0.5
 CLIMB_RADII, CLIMB_STEPS = 2.0, 32
-"""Length of the way to the vessel's middle, in the catheter's radii, and its steps: the room is found to a 32nd of a
-radius. Out of a corner, between a wall and the closed end behind an entry, the way is up to 1.7 radii long."""
+"""Length of the way to the vessel's middle, in radii of what lies in it, and its steps: the room is known to a 32nd of
+one. Out of a corner, between a wall and the closed end behind an entry, the way is up to 1.7 radii long."""
+CHECK = {
+    "wire": "is it the diameter? Check radius_mm, and the lumen there",
+    "catheter": "is it the diameter, or in French (6 of them are a radius of 1 mm)? Check its insertion_mm, and the "
+    "lumen there",
+}
 NARROWER_VOXELS = 1.0
 """By how much the room may be less than the radius: a wall is known to half a voxel, and the middle of a vessel between
 voxels is up to half a voxel farther from it than they say."""
 
 
-def too_thick(catheter: OverWire, frames: Sequence[Frame], wires: Sequence[Solution], wall: VesselWall) -> list[str]:
-    """A warning where the lumen has no room for the catheter that covers wires, one of each of the frames."""
+def too_thick(what: str, radius_mm: float, lines: Mapping[int, Array], wall: VesselWall) -> list[str]:
+    """A warning where the lumen has no room for a wire or a catheter. lines : where it lies, (n, 3) by frame."""
     least, where, count = np.inf, "", 0
-    for frame, wire in zip(frames, wires, strict=True):
-        points = covered(frame, wire)
-        if not wire.converged or not len(points):
+    for frame, points in lines.items():
+        if not len(points):
             continue
-        room = room_mm(wall, points, catheter.radius_mm)
+        room = room_mm(wall, points, radius_mm)
         worst = int(np.argmin(room))
-        count += _narrower(catheter.radius_mm, room[worst], wall)
+        count += bool(radius_mm > room[worst] + NARROWER_VOXELS * float(np.max(wall.distance.spacing_mm)))
         if room[worst] < least:
             place = ", ".join(f"{x:.1f}" for x in points[worst])
-            least, where = float(room[worst]), f"in frame {frame.index} near [{place}] mm"
+            least, where = float(room[worst]), f"in frame {frame} near [{place}] mm"
     if not count:
         return []
     return [
-        f"{counted(count, 'frame')}: the catheter is thicker than the vessel: radius_mm = {catheter.radius_mm:g}, and "
-        f"{where} the lumen has room for {max(least, 0.0):.2f} mm; the wire is simulated as if it fitted: is it the "
-        "diameter, or in French (6 of them are a radius of 1 mm)? Check its insertion_mm, and the lumen there"
+        f"{counted(count, 'frame')}: the {what} is thicker than the vessel: radius_mm = {radius_mm:g}, and "
+        f"{where} the lumen has room for {max(least, 0.0):.2f} mm; the wire is simulated as if it fitted: {CHECK[what]}"
     ]
 
 
-def _narrower(radius_mm: float, room: float, wall: VesselWall) -> bool:
-    return bool(radius_mm > room + NARROWER_VOXELS * float(np.max(wall.distance.spacing_mm)))
-
-
-def covered(frame: Frame, wire: Solution) -> Array:
-    """Points (n, 3) of a wire every STEP_MM up to the catheter's tip; none where that is at the entry."""
-    end = min(frame.catheter_mm, float(arc_length(wire.joints_mm)[-1]))
+def along(wire: Solution, end_mm: float = np.inf) -> Array:
+    """Points (n, 3) of a wire every STEP_MM from the entry to a depth or its tip; none of one not at rest."""
+    end = min(end_mm, float(arc_length(wire.joints_mm)[-1])) if wire.converged else 0.0
     return at_arc(wire.joints_mm, samples(end, STEP_MM)) if end > 0.0 else np.empty((0, 3))
 
 
 def room_mm(wall: VesselWall, points_mm: Array, radius_mm: float) -> Array:
     """Radii (n,) of the largest balls in the lumen that are met on the way from points (n, 3) to its middle.
 
-    The way is long enough for a catheter of ``radius_mm``, wherever in it the wire lies: no place of a vessel that is
+    The way is long enough for what has ``radius_mm``, wherever it lies: no place of a vessel that is
     wide enough for it is called narrow, the closed end behind an entry included.
     """
     at, room = np.array(points_mm), np.full(len(points_mm), -np.inf)
@@ -67,7 +65,7 @@ def room_mm(wall: VesselWall, points_mm: Array, radius_mm: float) -> Array:
     return room
 
 
-def deep_in_itself_mm(catheter: OverWire, frame: Frame, wire: Solution) -> float:
+def deep_in_itself_mm(catheter: OverWire, tip_mm: float, wire: Solution) -> float:
     """How deep a catheter over a wire lies in itself, mm; the wire beyond its tip may touch it unseen."""
-    points = covered(frame, wire)
+    points = along(wire, tip_mm)
     return self_overlap_mm(points, catheter.radius_mm) if len(points) > 1 else 0.0

@@ -10,7 +10,7 @@ from pipeline.model import OverWire
 from pipeline.run.log import Log
 from pipeline.run.stages.clamp import clamp_of
 from pipeline.run.stages.clues import beside_clues, clues_of
-from pipeline.run.stages.covered import deep_in_itself_mm, too_thick
+from pipeline.run.stages.covered import along, deep_in_itself_mm, too_thick
 from pipeline.run.stages.in_itself import not_in_itself, not_passed
 from pipeline.run.stages.known import Context, Frame, Known
 from pipeline.run.stages.others import frames_of_others
@@ -67,19 +67,25 @@ def _replayed(run: Context, known: Known) -> Known:
     resolved = _resolved(run, known, replay)
     log.assumptions.append(f"segments of {resolved.segment_mm:g} mm: {resolved.reason}")
     log.chosen["segment_mm"] = f"{resolved.segment_mm:g}: {resolved.reason}"
-    both = zip(replay, resolved.wires, strict=True)
-    untraced = {frame.index: wire.joints_mm for frame, wire in both if frame.curve is None and wire.converged}
-    log.warnings += turned_back(known.vessel.distance, known.held.entry_mm, untraced)
     bounds = zip(resolved.num_mm, resolved.num_push_N, strict=True)
     for frame, wire, (num_mm, num_push_N) in zip(replay, resolved.wires, bounds, strict=True):
         log.warnings += [_told(frame.index, snap) for snap in wire.snaps]
         found = replace(frame, simulated=wire, num_mm=float(num_mm), num_push_N=float(num_push_N))
         frames[frame.index] = judged(found, wire, case.wire.radius_mm, case.catheter)
-    log.warnings += _pressed_deep(replay, resolved.wires, case.wire.radius_mm)
-    if case.catheter is not None and known.lumen is not None:
-        wall = wall_of(known.lumen.distance, run.config.solver.hull)
-        log.warnings += too_thick(case.catheter, replay, resolved.wires, wall)
+    log.warnings += _doubtful(run, known, list(zip(replay, resolved.wires, strict=True)))
     return replace(known, frames=tuple(frames), segment_mm=resolved.segment_mm)
+
+
+def _doubtful(run: Context, known: Known, both: Sequence[tuple[Frame, Solution]]) -> list[str]:
+    """Warnings of simulated wires, those of frames, that have turned round, are pressed deep or find no room."""
+    case, wall = run.case, wall_of(known.vessel.distance, run.config.solver.hull)
+    untraced = {frame.index: wire.joints_mm for frame, wire in both if frame.curve is None and wire.converged}
+    said = turned_back(wall, known.held.entry_mm, untraced) + _pressed_deep(both, case.wire.radius_mm)
+    said += too_thick("wire", case.wire.radius_mm, {frame.index: along(wire) for frame, wire in both}, wall)
+    if case.catheter is not None:
+        covered = {frame.index: along(wire, frame.catheter_mm) for frame, wire in both}
+        said += too_thick("catheter", case.catheter.radius_mm, covered, wall)
+    return said
 
 
 def _resolved(run: Context, known: Known, frames: Sequence[Frame]) -> Resolved:
@@ -125,7 +131,7 @@ def judged(frame: Frame, wire: Solution, radius_mm: float, catheter: OverWire | 
     if catheter is None:
         return frame
     what = f"the catheter of radius_mm = {catheter.radius_mm:g}"
-    return not_in_itself(frame, deep_in_itself_mm(catheter, frame, wire), catheter.radius_mm, what)
+    return not_in_itself(frame, deep_in_itself_mm(catheter, frame.catheter_mm, wire), catheter.radius_mm, what)
 
 
 def _noted(log: Log, frames: Sequence[Frame], found: Iterator[Solution], total: int) -> Iterator[Solution]:
@@ -149,9 +155,9 @@ def _cut_short(frame: Frame) -> str:
     )
 
 
-def _pressed_deep(frames: Sequence[Frame], wires: Sequence[Solution], radius_mm: float) -> list[str]:
+def _pressed_deep(both: Sequence[tuple[Frame, Solution]], radius_mm: float) -> list[str]:
     """A warning where wires at rest lie deeper in the wall than their radius."""
-    deep = {frame.index: wire.max_penetration_mm for frame, wire in zip(frames, wires, strict=True) if wire.converged}
+    deep = {frame.index: wire.max_penetration_mm for frame, wire in both if wire.converged}
     deep = {frame: depth for frame, depth in deep.items() if depth > radius_mm > 0.0}
     if not deep:
         return []
