@@ -9,7 +9,7 @@ from solver._kernels.data import Profile, Sleeve
 from solver.doors import Array, Range, instance, number
 from solver.errors import refuse
 from solver.grid import read_only
-from solver.wire import GuideWire
+from solver.wire import THICKEST_MM, GuideWire
 
 PIECES = 32
 """Pieces of a stretch with a curved rest shape in which stiffness or curvature change: the pair's rest curvature is not
@@ -34,7 +34,8 @@ class Catheter:
         """Check the numbers."""
         stiffness = Range(0.0, 1e12, "20 to 200 is usual")
         number("catheter", "bending_stiffness_N_mm2", self.bending_stiffness_N_mm2, stiffness)
-        number("catheter", "radius_mm", self.radius_mm, Range(1e-6, 1e3, "0.9 is a catheter of 5 French"))
+        radius = Range(1e-6, THICKEST_MM, "0.9 is one of 5 French; write Catheter(bending_stiffness_N_mm2, radius_mm)")
+        number("catheter", "radius_mm", self.radius_mm, radius)
 
 
 def sleeve_of(wire: GuideWire, catheter: Catheter | None) -> Sleeve:

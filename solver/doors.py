@@ -23,11 +23,12 @@ Shape = tuple[int | EllipsisType | None, ...]
 
 
 class Range(NamedTuple):
-    """Least and largest value allowed, and what to do where a value is beyond them."""
+    """Least and largest value allowed, what to do where a value is beyond them, and what to write for other shapes."""
 
     least: float
     largest: float
     advice: str = "leave it out for the default"
+    shape: str = "give plain numbers, in the unit of its name"
 
 
 FAR_MM = 1e7
@@ -94,7 +95,7 @@ def numbers(what: str, name: str, value: object, shape: Shape, allowed: Range) -
     masked = isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value)
     if raw.dtype.kind not in "iuf" or not _fits(raw.shape, shape) or masked:
         kind = "a masked array" if masked else f"{raw.dtype} of shape {raw.shape}"
-        refuse(what, name, Found(f"{kind}, {value!r}"), text, "give plain numbers, in the unit of its name")
+        refuse(what, name, Found(f"{kind}, {value!r}"), text, allowed.shape)
     taken = np.asarray(raw, dtype=np.float64)
     # written so that NaN, which is its own minimum, fails too
     if taken.size and not (taken.min() >= allowed.least and taken.max() <= allowed.largest):

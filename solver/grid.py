@@ -6,10 +6,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from solver.doors import ANYWHERE_MM, LENGTH_MM, Array, Found, Range, numbers
+from solver.doors import ANYWHERE_MM, FAR_MM, Array, Found, Range, numbers
 from solver.errors import refuse
 
 __all__ = ["Array", "Grid", "read_only"]
+
+SPACING_MM = Range(1e-6, FAR_MM, "spacing is above 0: turn an axis round in `direction`", "write [0.4, 0.4, 0.4]")
+COSINES = Range(-2, 2, "columns of length 1", "of SimpleITK's nine: numpy.reshape(image.GetDirection(), (3, 3))")
 
 
 def read_only(array: ArrayLike, dtype: Any = None) -> NDArray[Any]:
@@ -51,7 +54,7 @@ class Grid:
     def __post_init__(self) -> None:
         """Freeze the arrays and refuse a geometry that is not one."""
         object.__setattr__(self, "values", _own(self.values))
-        allowed = {"spacing_mm": LENGTH_MM, "origin_mm": ANYWHERE_MM, "direction": Range(-2, 2, "columns of length 1")}
+        allowed = {"spacing_mm": SPACING_MM, "origin_mm": ANYWHERE_MM, "direction": COSINES}
         for name, limits in allowed.items():
             shape = (3, 3) if name == "direction" else (3,)
             value = numbers("grid", name, getattr(self, name), shape, limits)

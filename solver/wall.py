@@ -15,6 +15,7 @@ from solver.creases import creases
 from solver.doors import ANYWHERE_MM, FAR_MM, Array, Found, Range, instance, number, numbers
 from solver.errors import refuse
 from solver.grid import Grid, read_only
+from solver.wire import THICKEST_MM
 
 OFFSET_MM = Range(-FAR_MM, FAR_MM, "a tenth of a voxel is usual")
 MAKE_A_DISTANCE = (
@@ -25,6 +26,8 @@ SLICES = 16
 FLAT, STEEP = 0.5, 1.75
 """Gradients at the wall that no distance in mm has: in voxels of 0.5 mm it is 2, in metres 0.001. A lumen of a voxel's
 radius has 1.0, one with noise of half a voxel 1.6."""
+NO_LUMEN = 1e-6
+"""Of a voxel: what rounding leaves of a distance of 0."""
 
 
 def _is_mask(values: Array, least: float, largest: float) -> bool:
@@ -80,14 +83,25 @@ def steepness(values: Array, spacing_mm: Array) -> float:
     return float(np.median(np.linalg.norm(steps, axis=0)))
 
 
-def _warn_of(steep: float) -> None:
-    """A warning where the gradient at the wall is not that of a distance in mm."""
-    if steep < FLAT or steep > STEEP:
-        warnings.warn(
-            f"wall: distance: it changes by {steep:.2g} per mm across the wall, a signed distance in mm by 1; is it in "
-            "voxels or in metres, is the spacing right, are the axes x, y, z?",
-            stacklevel=4,
+def _doubts(values: Array, spacing_mm: Array) -> str:
+    """What is doubtful in distances (nx, ny, nz): there is no lumen, or the gradient at the wall is not 1; or empty.
+
+    A lumen thinner than a voxel may have no negative value either, so that it is no error.
+    """
+    least, steep = float(values.min()), steepness(values, spacing_mm)
+    if least > -NO_LUMEN * spacing_mm.min():
+        return (
+            f"the least value is {least:.2g} mm, so that the grid holds no lumen: distances are negative inside; of a "
+            "mask take distance_transform_edt(~mask, spacing_mm) less distance_transform_edt(mask, spacing_mm), of a "
+            "distance to a centreline subtract the vessel's radius"
         )
+    if FLAT <= steep <= STEEP or np.isnan(steep):
+        return ""
+    return (
+        f"it changes by {steep:.2g} per mm across the wall, a signed distance in mm by 1; is it in voxels or in "
+        "metres, or a difference of two distance transforms that was not smoothed (gaussian_filter(..., 1)), is the "
+        "spacing right, are the axes x, y, z?"
+    )
 
 
 def _padded(coefficients: Array) -> NDArray[np.float32]:
@@ -119,8 +133,8 @@ class VesselWall:
     hull : how the overlap d of a round wire with the wall is measured. "offset" takes its deepest point, d = max(0, φ +
     radius). "samples:N" takes the mean over N points around each joint. With the same k, a wall is softer with samples,
     and the more so the less deep the wire is pressed in, since few of the N points are then in the wall.
-    Beyond the grid the distance continues linearly. Raises ValueError for NaN or inf in the grid; warns if the slope at
-    the wall shows that the values are no distances in mm.
+    Beyond the grid the distance continues linearly. Raises ValueError for NaN or inf in the grid; warns if no value is
+    negative, or if the slope at the wall shows that the values are no distances in mm.
     """
 
     distance: Grid
@@ -134,7 +148,8 @@ class VesselWall:
         self._check_law()
         _ = self.samples
         values = _checked(instance("wall", "distance", self.distance, Grid))
-        _warn_of(steepness(values, self.distance.spacing_mm))
+        if doubts := _doubts(values, self.distance.spacing_mm):
+            warnings.warn(f"wall: distance: {doubts}", stacklevel=3)
         marks = creases(values, self.distance.spacing_mm)
         prefilter(values)
         to_index = np.ascontiguousarray((self.distance.direction / self.distance.spacing_mm).T)
@@ -187,7 +202,7 @@ class VesselWall:
 
     def hull_points(self, radius_mm: float) -> tuple[Array, float]:
         """Offsets (h, 2), mm, across a wire of this radius at which the distance is looked up, and mm to add to it."""
-        radius_mm = number("wall", "radius_mm", radius_mm, Range(0.0, 1e3, "0.18 is a 0.014 inch wire"))
+        radius_mm = number("wall", "radius_mm", radius_mm, Range(0.0, THICKEST_MM, "0.18 is a 0.014 inch wire"))
         if self.samples == 0:
             return np.zeros((1, 2)), radius_mm
         angle = 2 * np.pi * np.arange(self.samples) / self.samples

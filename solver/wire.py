@@ -11,13 +11,18 @@ from numpy.typing import ArrayLike
 from solver import _tolerances as tol
 from solver._kernels.chain import segments_at
 from solver._kernels.data import Profile
-from solver.doors import FAR_MM, Array, Range, number, numbers
+from solver.doors import FAR_MM, Array, Found, Range, number, numbers
 from solver.errors import refuse
 from solver.grid import read_only
 
 Quantity = float | ArrayLike | Callable[[Array], ArrayLike]
 
-ANY = Range(-1e12, 1e12, "write a number, [[distance from tip mm, value], ...] or a callable of distances")
+_FORMS = "write a number, [[distance from tip mm, value], ...] or a callable of distances"
+ANY = Range(-1e12, 1e12, _FORMS, _FORMS)
+SEGMENT_MM = Range(1e-3, 20.0, "0.25 to 1 is usual")
+"""Longer ones follow no vessel; 50 is 0.5 mistyped."""
+THICKEST_MM = 20.0
+"""Largest radius of a wire or a catheter, as in a manifest."""
 STIFFNESS_N_MM2 = Range(1e-12, 1e12, "0.5 to 40 is usual")
 CALLABLE_REACH_MM = 2000.0
 CALLABLE_STEP = 0.25
@@ -27,7 +32,7 @@ def _table(name: str, value: Quantity, segment_mm: float) -> tuple[Array, Array]
     """Abscissae (n,) and values (n,) of a number, a profile array or a callable of the distance from the tip."""
     if callable(value):
         at = np.arange(0.0, CALLABLE_REACH_MM, CALLABLE_STEP * segment_mm)
-        values = value(read_only(at))
+        values = _called(name, value, read_only(at))
         if np.ndim(values) == 0:
             return at, np.full(at.shape, number("wire", name, values, ANY))
         return at, numbers("wire", name, values, at.shape, ANY).copy()
@@ -38,6 +43,15 @@ def _table(name: str, value: Quantity, segment_mm: float) -> tuple[Array, Array]
             refuse("wire", name, rows[:, 0].tolist(), allowed, "write [[0.0, a], [30.0, b]]")
         return rows[:, 0].copy(), rows[:, 1].copy()
     return np.zeros(1), np.array([number("wire", name, value, ANY)])
+
+
+def _called(name: str, profile: Callable[[Array], ArrayLike], at: Array) -> ArrayLike:
+    """The values of a callable at distances (n,); one that takes a distance at a time, as with ``if``, is refused."""
+    try:
+        return profile(at)
+    except (TypeError, ValueError) as error:
+        allowed = "a function that takes an array of distances"
+        refuse("wire", name, Found(f"a function that fails with one: {error}"), allowed, "for an if, numpy.where")
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,8 +76,8 @@ class GuideWire:
 
     def __post_init__(self) -> None:
         """Check and tabulate the profiles."""
-        number("wire", "segment_mm", self.segment_mm, Range(1e-3, 1e3, "1.0 is a good start"))
-        number("wire", "radius_mm", self.radius_mm, Range(0.0, 1e3, "0.18 is a 0.014 inch wire"))
+        number("wire", "segment_mm", self.segment_mm, SEGMENT_MM)
+        number("wire", "radius_mm", self.radius_mm, Range(0.0, THICKEST_MM, "0.18 is a 0.014 inch wire"))
         if not np.array_equal(self.torsional_stiffness_N_mm2, math.inf):  # of any kind of float
             number("wire", "torsional_stiffness_N_mm2", self.torsional_stiffness_N_mm2, STIFFNESS_N_MM2)
         number("wire", "weight_N_per_mm", self.weight_N_per_mm, Range(0.0, 1.0, "0.36 mm of steel weigh 8e-6"))
@@ -71,7 +85,8 @@ class GuideWire:
         rest = _table("rest_curvature_per_mm", self.rest_curvature_per_mm, self.segment_mm)
         numbers("wire", "bending_stiffness_N_mm2", bend[1], (None,), STIFFNESS_N_MM2)
         steepest = math.pi / 2 / self.segment_mm
-        numbers("wire", "rest_curvature_per_mm", rest[1], (None,), Range(-steepest, steepest, "shorten segment_mm"))
+        advice = "it is 1/radius, in radians per mm: 0.15 for a J of 6.7 mm; for a tighter bend shorten segment_mm"
+        numbers("wire", "rest_curvature_per_mm", rest[1], (None,), Range(-steepest, steepest, advice))
         a, b, c, d = (read_only(array) for array in (*bend, *rest))
         profile = Profile(a, b, c, d, float(self.torsional_stiffness_N_mm2))
         object.__setattr__(self, "profile", profile)

@@ -9,8 +9,9 @@ from pydantic_core import PydanticCustomError
 
 from pipeline.ranges import Factor, Friction, NonNegative, Number, PositiveCount, Step, Turn
 from solver._kernels.minimise import METHODS
+from solver.wire import SEGMENT_MM
 
-Segment = Step | Literal["auto"]
+Segment = Annotated[float, Field(ge=0.01, le=SEGMENT_MM.largest, allow_inf_nan=False), Number] | Literal["auto"]
 HULLS: JsonDict = {"$comment": '"offset" or "samples:N", N from 1 to 256'}
 SAMPLES = r"([1-9]\d?|1\d\d|2[0-4]\d|25[0-6])"
 COARSEST_MM = 1.0

@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pipeline.arrays.order import turned_back
-from pipeline.arrays.polyline import angle_deg, at_arc, other_units, samples, turns_deg, unit_of
+from pipeline.arrays.polyline import UNITS_MM, angle_deg, at_arc, other_units, samples, turns_deg, unit_of
 from pipeline.model import Array, arc_length
+from solver import Grid
 
 AT_ENTRY_MM = 5.0
 """Largest distance, mm, from the manifest's entry at which a wire may begin: more than the radius of any vessel that a
@@ -56,12 +57,18 @@ def begun(points_mm: Array, entry_mm: Array, direction: Array) -> Array:
 
 
 def oddity(
-    points_mm: Array, entry_mm: Array, direction: Array, unit: str = "mm", depth_mm: float = float("nan")
+    points_mm: Array,
+    entry_mm: Array,
+    direction: Array,
+    unit: str = "mm",
+    depth_mm: float = float("nan"),
+    scan: Grid | None = None,
 ) -> str:
     """Why a wire cannot have been pushed in at this entry, and what would make it fit; empty where it can.
 
     unit : in which its numbers were stated to be, before they became mm.     depth_mm : how deep it should be, where
-    that is known: no unit explains a wire that it makes more than three times as long, or as short.
+    that is known: no unit explains a wire that it makes more than three times as long, or as short. Where it is not, no
+    unit explains one that it makes shorter than its base may be off.     scan : whose voxels its numbers may be.
     """
     back = turned_back(points_mm, STEP_BACK_MM)
     if len(back):
@@ -69,7 +76,10 @@ def oddity(
     wrong = _misplaced(points_mm, entry_mm, direction)
     if not wrong:
         return ""
-    readings = _readings(points_mm, unit)
+    readings = [*_readings(points_mm, unit)]
+    index = points_mm / UNITS_MM[unit]
+    if scan is not None and np.abs(index).max() <= max(scan.shape):
+        readings.insert(0, ("in voxels", scan.to_mm(index)))
     # one that only just passes, too, explains nothing
     near = 0.5 * AT_ENTRY_MM
     for name, other in readings:
@@ -111,8 +121,8 @@ def _readings(points_mm: Array, unit: str) -> Iterator[tuple[str, Array]]:
 
 
 def _far_from(depth_mm: float, length_mm: float) -> bool:
-    """Whether a wire of this length is none of this depth; never where the depth is not known."""
-    return bool(max(length_mm, 1e-9) > 3.0 * depth_mm or 3.0 * length_mm < depth_mm)
+    """Whether a wire of this length is none of this depth, or of none that is worth a frame where that is NaN."""
+    return bool(length_mm < AT_ENTRY_MM if np.isnan(depth_mm) else not depth_mm / 3.0 <= length_mm <= 3.0 * depth_mm)
 
 
 def quarter_mm(radius_mm: float) -> float:

@@ -41,10 +41,11 @@ def check_case(case: Case, config: Config, *, whole: bool = True) -> list[str]:
     """What would stop or spoil this case; empty when nothing is found."""
     absent = dict(_absent(case))
     found = _Findings([*repeated(case), *absent.values()])
-    count = _look_at_scans(case, config, absent, whole, found)
+    count, scan = _look_at_scans(case, config, absent, whole, found)
     if count is not None:
         found += not_one_per_frame(case.lists, count)
     found += _told_problems(case, count, absent)
+    found += [] if count is None else _others_problems(case, count, scan)
     for source in case.traces:
         if source.path not in absent:
             found.tried(read_curve, source.path)
@@ -70,8 +71,10 @@ class _Findings(list[str]):
             return None
 
 
-def _look_at_scans(case: Case, config: Config, absent: Container[Path], whole: bool, found: _Findings) -> int | None:
-    """How many frames the case has; None where the header of one is not known, whose file may hold several."""
+def _look_at_scans(
+    case: Case, config: Config, absent: Container[Path], whole: bool, found: _Findings
+) -> tuple[int | None, Header | None]:
+    """How many frames the case has, None where a header is not known, whose file may hold several; and a header."""
 
     def header_of(source: Source | None) -> Header | None:
         if source is None or source.path in absent:
@@ -86,7 +89,7 @@ def _look_at_scans(case: Case, config: Config, absent: Container[Path], whole: b
     scans = Scans(empty, tuple(volume for header in frames if header for volume in each_volume(header))).cut
     found += apart(scans.all)
     found += entry_problems(case, scans)
-    return None if None in frames else len(scans.frames) or case.frame_count
+    return None if None in frames else len(scans.frames) or case.frame_count, scans.first
 
 
 def frames_of(case: Case, config: Config) -> int:
@@ -111,7 +114,7 @@ def _absent(case: Case) -> Iterator[tuple[Path, str]]:
 
 
 def _told_problems(case: Case, count: int | None, absent: Container[Path]) -> list[str]:
-    """What is wrong with the roll, the truth, the projections and another simulator's wires. count : of the frames."""
+    """What is wrong with the roll, the truth and the projections. count : of the frames."""
     problems = []
     seen = count if case.frames or case.traces else 0
     if case.roll_deg == "fit" and case.role == "validation" and seen is not None and seen < 2:
@@ -123,10 +126,10 @@ def _told_problems(case: Case, count: int | None, absent: Container[Path]) -> li
                 read(told, count)
         except LoadError as error:
             problems.append(str(error))
-    return problems + ([] if count is None else _others_problems(case, count))
+    return problems
 
 
-def _others_problems(case: Case, count: int) -> list[str]:
+def _others_problems(case: Case, count: int, scan: Header | None) -> list[str]:
     """What is wrong with all wires of another simulator; what is wrong with some of them is for their frames to say."""
     if case.simulated is None:
         return []
@@ -135,7 +138,12 @@ def _others_problems(case: Case, count: int) -> list[str]:
     except LoadError as error:
         return [str(error)]
     entry, direction = np.array(case.entry_mm), np.array(case.entry_direction)
-    wrong = [f.problem if f.points_mm is None else oddity(f.points_mm, entry, direction, f.unit) for f in files]
+    grid, stated = None if scan is None else scan.grid, case.insertion_mm or ()
+    depths = stated if len(stated) == len(files) else [float("nan")] * len(files)
+    wrong = [
+        file.problem if file.points_mm is None else oddity(file.points_mm, entry, direction, file.unit, depth_mm, grid)
+        for file, depth_mm in zip(files, depths, strict=True)
+    ]
     if not files or not case.simulated.files or not all(wrong):
         return []
     shown = next((n for n, file in enumerate(files) if not file.missing), 0)

@@ -57,13 +57,13 @@ def _oddities(wire: Wire) -> Iterator[str]:
     if sharpest * radius > SHARPEST:
         yield (
             f"rest_curvature_per_mm of {sharpest:.3g} at the most: a bend of {1.0 / sharpest:.2g} mm radius in a wire "
-            f"of radius_mm = {radius:g}; is it a radius (mm), or per metre?"
+            f"of radius_mm = {radius:g}; is it a radius (mm), in degrees, or per metre?"
         )
     turned = _turned_deg(wire)
     if turned > MOST_TURNED_DEG:
         yield (
             f"rest_curvature_per_mm turns the wire by {turned:.0f} degrees in all: pigtails turn by 360 or so, and "
-            "what turns more lies in itself; is it per cm, or the length of the curve wrong?"
+            "what turns more lies in itself; is it in degrees, per cm, or the length of the curve wrong?"
         )
     heaviest = HEAVIEST_N_MM3 * np.pi * radius**2
     if wire.weight_N_per_mm > heaviest:

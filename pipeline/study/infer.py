@@ -71,6 +71,20 @@ DEEPEST = 4
 """Folders below the given one in which scans are looked for, for the message alone."""
 
 
+def _cases(folder: Path) -> str:
+    """A hint where the folder holds several that look like a case each, with frames or a reference; empty without."""
+    below = [p for p in sorted(folder.iterdir()) if is_folder(p) and p.name != "frames" and not _is_scan(p)]
+    found = [p for p in below if is_folder(p / "frames") or any(map(looks_wire_free, p.iterdir()))]
+    if len(found) < 2:
+        return ""
+    name, first = folder.resolve().name, found[0].name
+    return (
+        f"; {name} holds {len(found)} folders that look like cases: {listed([p.name for p in found], 3)}; run `wireval "
+        f"init` on each, as on {name}/{first}, then put their [[case]] blocks and one [wires.assumed] into one "
+        f"{name}/manifest.toml, with {first}/ and so on before their paths"
+    )
+
+
 def _deeper(folder: Path) -> str:
     """A hint where scans lie further down than they are looked for, as archives export them; empty without."""
     below = (p for depth in range(2, DEEPEST + 1) for p in sorted(folder.glob("/".join("*" * depth))))
@@ -192,7 +206,7 @@ def infer_manifest(
     if not frames:
         allowed = f"files {', '.join(SUFFIXES)} or DICOM folders, here or in frames/"
         found = f"{reference.name} alone, a reference, and no frames" if reference else "no scans"
-        hint = _loose(folder) or _items(folder) or _deeper(folder) or _packed(folder)
+        hint = _loose(folder) or _items(folder) or _cases(folder) or _deeper(folder) or _packed(folder)
         raise unusable(folder, f"found {found}; allowed: {allowed}{hint}")
     seen = (
         f"frames: {len(frames)} scans in natural order, {_order([path.name for path in frames])}",

@@ -62,7 +62,8 @@ def test_what_is_drawn_or_tried_has_to_fit_too(study: Path) -> None:
     ("words", "said"),
     [
         (("--set", "solver.segment_mm=20"), "segments of 20 mm cannot follow"),
-        (("--sweep", "solver.segment_mm=1,50"), "segments of 50 mm cannot follow"),
+        (("--sweep", "solver.segment_mm=1,19"), "segments of 19 mm cannot follow"),
+        (("--set", "solver.segment_mm=50"), "expected a number from 0.01 to 20"),
         (("--set", "solver.hull=samples:257"), "N from 1 to 256"),
         (("--set", "simulate.friction=11"), "expected a number from 0 to 10"),
         (("--set", "segment.scale=1000"), "expected a whole number from 0 to 20"),

@@ -271,6 +271,20 @@ def test_scans_further_down_are_named(tmp_path: Path, monkeypatch: pytest.Monkey
     assert f"up into {tmp_path.name}/frames" in _deeper(Path()), "it was /frames, of the disk"
 
 
+def test_folders_that_look_like_cases_are_no_frames_of_one(tmp_path: Path) -> None:
+    """Frames of three insertions were to be moved into one folder."""
+    for name in ("ins1", "ins2", "ins3"):
+        (tmp_path / name / "frames").mkdir(parents=True)
+        for scan in ("reference.mha", "frames/d22.mha"):
+            (tmp_path / name / scan).touch()
+    with pytest.raises(LoadError) as error:
+        infer_manifest(tmp_path, None, None, None, LoadConfig())
+    here, said = tmp_path.name, str(error.value)
+    assert f"{here} holds 3 folders that look like cases: ins1, ins2, ins3; run `wireval init` on" in str(error.value)
+    assert f"into one {here}/manifest.toml, with ins1/ and so on before their paths" in said
+    assert "move" not in said
+
+
 def test_what_is_packed_is_to_be_unpacked(tmp_path: Path) -> None:
     """A folder as a data set was handed out was "found no scans"."""
 

@@ -197,11 +197,13 @@ def test_a_clamp_cannot_be_borrowed_from_nowhere_or_in_a_ring(tmp_path: Path) ->
         (("[[0.0, 0.5], [30.0, 5.0]]", "[[0.0, 5.0], [30.0, 0.5]]"), "bending_stiffness_N_mm2 is 5 at the tip and 0.5"),
         (
             ("[30.0, 5.0]]", "[30.0, 5.0]]\nrest_curvature_per_mm = 8.3"),
-            "rest_curvature_per_mm of 8.3 at the most: a be",
+            "rest_curvature_per_mm of 8.3 at the most: a bend of 0.12 mm radius in a wire of radius_mm = 0.18; is it a "
+            "radius (mm), in degrees, or per metre?",
         ),
         (
             ("[30.0, 5.0]]", "[30.0, 5.0]]\nrest_curvature_per_mm = [[0, 1.2], [8, 1.2], [8, 0]]"),
-            "rest_curvature_per_mm turns the wire by 550 degrees in all",
+            "rest_curvature_per_mm turns the wire by 550 degrees in all: pigtails turn by 360 or so, and what turns "
+            "more lies in itself; is it in degrees, per cm",
         ),
         (("[30.0, 5.0]]", "[30.0, 5.0]]\nweight_N_per_mm = 7e-3"), "weight_N_per_mm = 0.007: a rod of"),
         (("[30.0, 5.0]]", "[30.0, 5.0]]\ntorsional_stiffness_N_mm2 = 5e-6"), "torsional_stiffness_N_mm2 = 5e-06 is 1e"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import pickle
 import re
 import shutil
@@ -37,6 +38,7 @@ from pipeline.study.settings import resolve
 from reports.doubts import OF_THEIR_RUN
 from reports.export import write_markups_curve, write_polyline_vtp
 from reports.verdict import remarks
+from solver import Grid
 from tests.pipeline.known_study import FRAMES, PEERS, QUICK, Known, errors_of, peers, run_known, simulated, write_csv
 
 Array = NDArray[np.float64]
@@ -296,6 +298,22 @@ def test_a_reading_that_only_just_passes_is_none() -> None:
     entry, up = np.array([0.3, 0.0, 50.0]), np.array([0.0, 0.0, 1.0])
     wire = entry - [5.2, 0.0, 0.0] + np.arange(20.0)[:, None] * up
     assert oddity(wire, entry, up).endswith("check its coordinates")
+
+
+def test_a_wire_in_voxels_is_told_as_such() -> None:
+    """It "would if it were in µm": near the origin lies the entry, and with it whatever is divided by 1000."""
+    entry, up = np.array([0.3, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
+    scan = Grid(np.zeros((30, 30, 120)), [0.4] * 3, [-5.0, -6.3, -9.0])
+    wire = entry + np.arange(31.0)[:, None] * up
+    index = scan.to_index(wire)
+    for depth_mm in (math.nan, 30.0):
+        assert oddity(wire, entry, up, depth_mm=depth_mm, scan=scan) == ""
+        assert oddity(index, entry, up, depth_mm=depth_mm, scan=scan).endswith("it would if it were in voxels")
+        assert oddity(index, entry, up, depth_mm=depth_mm).endswith("check its coordinates")
+    in_m = 1e3 * index
+    assert oddity(1e20 * in_m, entry, up, scan=scan).endswith("check its coordinates")
+    assert oddity(in_m, entry, up, "m", scan=scan).endswith("it would if it were in voxels"), "whatever unit was stated"
+    assert "in µm" in oddity(1e3 * (wire + 6.0 * up), entry + 6.0 * up, up), "one of 30 mm may be in it"
 
 
 def test_a_unit_explains_no_wire_that_it_makes_too_long() -> None:

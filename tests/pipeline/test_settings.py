@@ -49,7 +49,7 @@ def test_resolved_settings_read_back(tmp_path: Path) -> None:
     [
         ("solver.segmnt_mm=1", "did you mean 'segment_mm'"),
         ("sovler.segment_mm=1", "did you mean 'solver'"),
-        ("solver.segment_mm=wide", '"wide": expected a number from 0.01 to 100 or "auto"'),
+        ("solver.segment_mm=wide", '"wide": expected a number from 0.01 to 20 or "auto"'),
         (
             "budget.members=abc",
             'budget.members = "abc": expected a whole number from 0; correct it, or leave it out for 0',

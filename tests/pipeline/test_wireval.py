@@ -60,7 +60,7 @@ def test_an_own_file_of_the_name_of_a_package_is_named(tmp_path: Path, name: str
 def test_a_check_gives_sentences(study: Path, tmp_path: Path) -> None:
     assert wireval.check(study) == []
     assert wireval.check(tmp_path / "none.toml") == [f"{tmp_path / 'none.toml'}: no such manifest"]
-    assert "expected a number from 0.01 to 100" in wireval.check(study, settings={"solver.segment_mm": -1})[0]
+    assert "expected a number from 0.01 to 20" in wireval.check(study, settings={"solver.segment_mm": -1})[0]
     nested = {"solver": {"segment_mm": 0.5}}
     assert wireval.check(study, settings=nested) == ['settings: write {"solver.segment_mm": 0.5}']
     assert wireval.check(tmp_path)[0].endswith("here or in frames/"), "a folder without scans"

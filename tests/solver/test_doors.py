@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import math
 import re
 import sys
 import warnings
@@ -37,6 +38,8 @@ NOT_WORDS = [None, 1, True, "", "Newton", ["newton"], np.array(["newton", "slide
 NOT_TABLES = [[], [[]], [1.0, 2.0], [[0, 1.0, 2.0]], [[0, 1], [1]], [["0", "1"]], [[np.nan, 1.0]], [[0.0, np.nan]]]
 NOT_TABLES += [[[np.inf, 1.0]], [[5, 1.0], [0, 2.0]], [[-1.0, 1.0]], [[0.0, 1.0], [np.nan, 2.0]], np.ones((2, 2), bool)]
 NOT_TABLES += [
+    lambda s: 0.5 if s < 30.0 else 5.0,
+    lambda s: math.exp(s),
     lambda s: s * np.nan,
     lambda s: "1",
     lambda s: None,
@@ -90,8 +93,8 @@ DOORS: dict[str, tuple[Callable[..., Any], dict[str, list[Any]]]] = {
     "wire": (
         wire,
         {
-            "segment_mm": NOT_NUMBERS + HUGE + BELOW,
-            "radius_mm": NOT_NUMBERS + HUGE + [-1.0],
+            "segment_mm": NOT_NUMBERS + HUGE + BELOW + [50.0],
+            "radius_mm": NOT_NUMBERS + HUGE + [-1.0, 60.0],
             "bending_stiffness_N_mm2": [v for v in NOT_NUMBERS if not callable(v)] + NOT_TABLES + HUGE + BELOW,
             "rest_curvature_per_mm": [v for v in NOT_NUMBERS if not callable(v)] + NOT_TABLES + HUGE + [3.0, -3.0],
             "weight_N_per_mm": NOT_NUMBERS + HUGE + [-1e-6],
@@ -100,7 +103,7 @@ DOORS: dict[str, tuple[Callable[..., Any], dict[str, list[Any]]]] = {
     ),
     "catheter": (
         lambda **how: Catheter(**({"bending_stiffness_N_mm2": 50.0, "radius_mm": 0.9} | how)),
-        {"bending_stiffness_N_mm2": NOT_NUMBERS + HUGE + [-1.0], "radius_mm": NOT_NUMBERS + HUGE + BELOW},
+        {"bending_stiffness_N_mm2": NOT_NUMBERS + HUGE + [-1.0], "radius_mm": NOT_NUMBERS + HUGE + BELOW + [60.0]},
     ),
     "wall": (
         wall,
@@ -428,6 +431,48 @@ def test_a_distance_in_another_unit_is_warned_of(change: Any, steep: str) -> Non
     grid = tube_grid()
     with pytest.warns(UserWarning, match=f"changes by {steep} per mm across the wall"):
         VesselWall(grid.with_values(solver.grid.read_only(change(grid.values.astype(np.float64)))), 1.0)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda d: ndimage.distance_transform_edt(d >= 0.0),
+        lambda d: ndimage.gaussian_filter(ndimage.distance_transform_edt(d >= 0.0), 1),
+        lambda d: d + 2.0,
+        np.abs,
+    ],
+    ids=["outside alone", "outside alone, filtered", "to the centreline", "without a sign"],
+)
+def test_a_grid_without_a_lumen_is_warned_of(change: Any) -> None:
+    """Wires came to rest in it, up to 1.8 mm off and with a push of 1.7 N in place of 0.002."""
+    grid = tube_grid()
+    with pytest.warns(UserWarning, match=r"least value is .* mm, so that the grid holds no lumen.*subtract the vessel"):
+        VesselWall(grid.with_values(solver.grid.read_only(change(grid.values.astype(np.float64)))), 1.0)
+
+
+def test_distances_that_were_not_smoothed_are_named_as_such() -> None:
+    inside = tube_grid().values < 0.0
+    halves = (ndimage.distance_transform_edt(half, 0.25) for half in (~inside, inside))
+    with pytest.warns(UserWarning, match=r"changes by 2 per mm .*two distance transforms that was not smoothed"):
+        VesselWall(Grid(np.subtract(*halves), [0.25] * 3), 1.0)
+
+
+@pytest.mark.parametrize(
+    ("call", "arguments", "advice"),
+    [
+        (grid, {"spacing_mm": [0.4, 0.4, -0.4]}, "spacing is above 0: turn an axis round in `direction`"),
+        (grid, {"spacing_mm": 0.4}, "write [0.4, 0.4, 0.4]"),
+        (grid, {"direction": (1, 0, 0, 0, 1, 0, 0, 0, 1)}, "numpy.reshape(image.GetDirection(), (3, 3))"),
+        (wire, {"rest_curvature_per_mm": 6.7}, "it is 1/radius, in radians per mm: 0.15 for a J of 6.7 mm"),
+        (wire, {"bending_stiffness_N_mm2": [0.5, 5.0]}, "write a number, [[distance from tip mm, value], ...]"),
+        (wire, {"bending_stiffness_N_mm2": lambda s: 0.5 if s < 30.0 else 5.0}, "for an if, numpy.where"),
+        (Catheter, {"bending_stiffness_N_mm2": 0.9, "radius_mm": 60.0}, "Catheter(bending_stiffness_N_mm2, radius_mm)"),
+    ],
+)
+def test_a_refusal_says_how_to_write_it(call: Callable[..., Any], arguments: dict[str, Any], advice: str) -> None:
+    """They said to leave a spacing out, to write plain numbers, and to shorten the segments for a radius of 6.7 mm."""
+    with pytest.raises(ValueError, match=re.escape(advice)):
+        call(**arguments)
 
 
 @pytest.mark.parametrize("lumen", [0.25, 0.5, 2.0])

@@ -24,7 +24,7 @@ def free(wire: GuideWire = STIFF, **how: float) -> Insertion:
     ("insertion", "depths", "rolls"),
     [
         (free(step_mm=1e-5), [100.0], 0.0),
-        (free(GuideWire(1000.0, 0.1, 1.0)), [1e7], 0.0),
+        (free(GuideWire(20.0, 0.1, 1.0), step_mm=1e-4), [3e4], 0.0),
         (free(GuideWire(1.0, 0.1, 1.0, 0.02), roll_step_deg=1e-6), [10.0, 10.0], [0.0, 1e4]),
         (free(step_mm=1e-5), [0.01, 0.02, 100.0], 0.0),
     ],

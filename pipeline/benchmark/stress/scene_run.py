@@ -1,5 +1,6 @@
 """Run one plan and judge every depth of it."""
 
+import warnings
 from dataclasses import dataclass
 from time import process_time
 
@@ -68,7 +69,10 @@ def build(plan: ScenePlan) -> tuple[GuideWire, VesselWall | None]:
     wire = GuideWire(plan.segment_mm, plan.radius_mm, plan.stiffness, plan.rest, plan.torsion)
     if not plan.wall:
         return wire, None
-    return wire, VesselWall(lumen_grid(plan), plan.wall_stiffness, plan.friction, plan.hull)
+    with warnings.catch_warnings():
+        # a lumen of a single voxel, or of none, is a scene like another
+        warnings.filterwarnings("ignore", "wall: distance: the least value")
+        return wire, VesselWall(lumen_grid(plan), plan.wall_stiffness, plan.friction, plan.hull)
 
 
 def solve(plan: ScenePlan, wire: GuideWire, wall: VesselWall | None) -> list[tuple[Solution, float]]:
