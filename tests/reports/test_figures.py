@@ -191,6 +191,17 @@ def test_no_force_is_another_colour_than_a_little_one(tmp_path: Path) -> None:
     assert none.count() + forces.count() == len(drawing.table)
 
 
+def test_a_table_of_forces_tells_refused_frames_from_others(tmp_path: Path) -> None:
+    case = _heat_case(tmp_path)
+    assert case.samples is not None
+    errors = pd.DataFrame({"frame": [0, 2], "status": ["ok", "no_wire"]})
+    forces = case.samples.assign(contact_force_N=1.0)
+    drawing = CASE_FIGURES["contact_along_wire"](replace(case, samples=forces, errors=errors))
+    assert drawing is not None
+    told = {*zip(drawing.table["frame"], drawing.table["status"], strict=True)}
+    assert told == {(0, "ok"), (2, "no_wire")}
+
+
 def test_heat_map_shows_each_sample_at_its_place(tmp_path: Path) -> None:
     drawing = CASE_FIGURES["error_along_wire"](_heat_case(tmp_path))
     assert drawing is not None

@@ -23,12 +23,12 @@ ERRORS_HEADER = (
     "hausdorff_mm,arc_rms_mm,arc_max_mm,tip_mm,tip_angle_deg,tip_along_mm,tip_across_mm,depth_offset_mm,side_ok,"
     "branch_ok,null_centreline_rms_mm,null_shortest_rms_mm,null_min_bending_rms_mm,null_previous_rms_mm,"
     "null_roll_unknown_rms_mm,null_no_tip_curve_rms_mm,null_pinned_rms_mm,null_neighbours_rms_mm,skill,"
-    "skill_strongest,strongest_null,coverage,trace_sigma_mm,max_penetration_mm,push_force_N,joints,iterations,"
-    "num_mm,snaps,uncertain,least_pivot,u_input_mm,u_val_mm,share_beyond_2u,release,release_real,log_score_bits,"
+    "skill_strongest,strongest_null,coverage,trace_sigma_mm,max_penetration_mm,push_force_N,num_push_N,joints,"
+    "iterations,num_mm,snaps,uncertain,least_pivot,u_input_mm,u_val_mm,share_beyond_2u,release,release_real,log_score_bits,"
     "energy_score_mm,released,released_at_mm,trace_mean_mm,"
     "trace_max_mm,trace_tip_mm,truth_rms_mm,truth_tip_mm"
 )
-POINTS_HEADER = "frame,arc_mm,x_mm,y_mm,z_mm,error_mm,foot_arc_mm,contact_force_N,u_val_mm,error_over_u"
+POINTS_HEADER = "frame,status,arc_mm,x_mm,y_mm,z_mm,error_mm,foot_arc_mm,contact_force_N,u_val_mm,error_over_u"
 SUMMARY_HEADER = (
     "case,group,role,status,frames,frames_ok,frames_failed,insertions,interval,effective_frames,rms_mm,"
     "release_frames,rms_calm_mm,releases_both,releases_missed,releases_spurious,rms_low_mm,rms_high_mm,mean_mm,"
@@ -39,8 +39,8 @@ SUMMARY_HEADER = (
     "trace_tip_median_mm,truth_rms_mm,max_penetration_mm,push_force_max_N,strongest_frames,frames_fitted,ends_rank,"
     "strongest_insertions,warnings,skill_frames,back_rms_mm,tip_max_mm,"
     "tip_along_median_mm,tip_across_median_mm,depth_offset_mm,side_ok,null_roll_unknown_rms_mm,null_no_tip_curve_rms_mm,"
-    "null_pinned_rms_mm,null_neighbours_rms_mm,trace_sigma_mm,num_mm,u_input_mm,u_val_mm,share_beyond_2u,log_score_bits,"
-    "energy_score_mm"
+    "null_pinned_rms_mm,null_neighbours_rms_mm,trace_sigma_mm,num_push_max_N,num_mm,u_input_mm,u_val_mm,share_beyond_2u,"
+    "log_score_bits,energy_score_mm"
 )
 TIMINGS_HEADER = "case,frame,load_s,segment_s,trace_s,clamp_s,simulate_s,compare_s,total_s,peak_memory_MiB"
 FAILURES_HEADER = "case,frame,stage,status,sentence,message,log,simulator"
