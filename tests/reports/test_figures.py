@@ -392,6 +392,15 @@ def test_a_budget_is_drawn_by_source_and_by_entry(tmp_path: Path) -> None:
     assert CASE_FIGURES["budget"](handed_in) is None, "it is of our solver's wire"
 
 
+def test_marks_at_the_end_of_four_entries_are_whole(tmp_path: Path) -> None:
+    """Four like distances far from 0 had a margin of a twentieth of their range: squares were cut by the frame."""
+    far = dict.fromkeys(("rms_mm", "distal10_rms_mm", "tip_median_mm"), 0.15)
+    tables.write(tmp_path / "entries.csv", ENTRIES, [{"clamp": "manifest", "depth": "traced"} | far])
+    drawing = CASE_FIGURES["budget"](_empty_case(tmp_path))
+    assert drawing is not None
+    assert drawing.figure.axes[0].get_xlim() == pytest.approx((0.0, 0.165))
+
+
 def test_only_what_was_computed_of_a_budget_is_drawn(tmp_path: Path) -> None:
     """With budget.members_alone = 4 eight names stood beside no bar, the first of them on the frame."""
     rows: list[dict[str, Any]] = [{"source": name, "sigma": ""} for name in ("clamp", "roll")]
