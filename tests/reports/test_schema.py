@@ -133,6 +133,7 @@ def test_every_pooled_column_has_its_place_in_the_summary() -> None:
         "trace_mean_mm": "trace_mean_median_mm",
         "trace_tip_mm": "trace_tip_median_mm",
         "push_force_N": "push_force_max_N",
+        "num_push_N": "num_push_max_N",
     }
 
 
