@@ -22,9 +22,8 @@ class FrameStatus(Enum):
     TRACE_LEFT_LUMEN = "the traced curve leaves the lumen; check the lumen, the registration and trace settings"
     TRACE_AMBIGUOUS = "the wire can be followed in more than one way here; look at the picture before using it"
     TRACE_LOW_CONTRAST = (
-        "nothing at the entry stands out of the noise enough to be called the wire: entry_mm is not on it, or the "
-        "frame shows none or too faintly; check both, then list a frame of a smaller depth before it, or scan with "
-        "more dose"
+        "no line at the entry stands out of the noise enough to be called the wire: entry_mm is not on it, or the "
+        "frame shows none or too faintly; the message has what to do"
     )
     TRACE_LEFT_SCAN = "the wire runs out of the scan: its tip, or a part before it, is not in this frame"
     TRACE_WRONG_WAY = (

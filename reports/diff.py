@@ -4,7 +4,7 @@ Reads errors.csv of every case of both folders and nothing else, so a folder of 
 """
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Container, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
@@ -12,7 +12,7 @@ from typing import Any
 
 import pandas as pd
 
-from reports.case_files import GOOD, counted, find_cases, listed
+from reports.case_files import GOOD, counted, find_cases, listed, not_run, results_in
 from reports.closing import BEFORE_COMPARE, how_many, is_error, told, worst_first
 from reports.schema import ERRORS
 from reports.tables import read_if_there
@@ -33,11 +33,12 @@ class Difference:
     verdict : "same"; "within" what is allowed; "better"; "regression"; "moved", a value of which neither direction is
     better that changed by more than is allowed, or a column that the second run has in no frame; "new", what only the
     second run has (of a frame, ``after`` is its status).     empty : cases of which the first run has no number to
-    compare with.
+    compare with.     unscored : cases of role calibration that one run alone has: they count in no score of it.
     """
 
     rows: pd.DataFrame
     empty: tuple[str, ...] = ()
+    unscored: tuple[str, ...] = ()
 
     @property
     def regressions(self) -> pd.DataFrame:
@@ -108,6 +109,8 @@ class Difference:
             tail += f"; the second run has no {', '.join(self.lacking)} in any frame"
         if self.empty:
             tail += f"; the first run has nothing to hold against in {', '.join(self.empty)}"
+        if self.unscored:
+            tail += f"; not compared, since one run alone has them and they count in no score: {listed(self.unscored)}"
         mended = self.rows[(self.rows["column"] == "status") & (self.rows["verdict"] == "better")]
         mended = mended[~mended["before"].isin(GOOD)]
         if len(mended):
@@ -138,8 +141,10 @@ def diff_folders(
     """Compare errors.csv of every case of two output folders; ``out_a`` is the reference.
 
     A case without errors.csv counts as one without frames. damaged : cases of ``out_b`` whose files cannot be relied
-    on, and why; each is a regression. Raises ValueError where ``out_a`` has no case or no number, since a gate without
-    a reference would always be open.
+    on, and why; each is a regression. A case of role calibration that one run alone has is named and not compared: a
+    calibrated run leaves it out itself.
+
+    Raises ValueError where ``out_a`` has no case or no number, since a gate without a reference would always be open.
     """
     before, after = (
         {
@@ -151,11 +156,20 @@ def diff_folders(
     )
     if not before:
         raise ValueError(f"{out_a}: no cases/*/errors.csv; give a folder that `wireval run` wrote")
+    beside = {*_unscored(out_a, before, out_b, after), *_unscored(out_b, after, out_a, before)} - {*damaged}
+    before, after = ({n: table for n, table in of.items() if n not in beside} for of in (before, after))
     empty = tuple(name for name, table in before.items() if not _has_numbers(table, tolerance))
     if len(empty) == len(before):
         what = "nothing to hold against: no frame of it is ok and has an error that the tolerance names"
         raise ValueError(f"{out_a}: {what}; a run that ended before frames are compared has none")
-    return replace(diff_tables(before, after, tolerance, damaged), empty=empty)
+    return replace(diff_tables(before, after, tolerance, damaged), empty=empty, unscored=tuple(sorted(beside)))
+
+
+def _unscored(out: Path, own: Container[str], other: Path, others: Container[str]) -> list[str]:
+    """Cases of role calibration that are in one folder alone, where no run into the other was to compute them."""
+    roles = {name: result.get("role") for name, result in results_in(out).items() if name in own and name not in others}
+    awaited = not_run(other)
+    return [name for name, role in roles.items() if role == "calibration" and name not in awaited]
 
 
 def not_judged(tolerance: Mapping[str, float]) -> str:

@@ -31,9 +31,9 @@ from reports.run_page import readable_cases, run_files
 from reports.schema import FAILURES, OVERALL_FILE, SUMMARY
 from reports.tables import first_row, in_texts, read_if_there
 from reports.unscored import unscored
-from reports.verdict import verdict
+from reports.verdict import WORSE, verdict
 from reports.what_next import next_command, typed, worst_frames
-from reports.worse import worse_sentence
+from reports.worse import worse_cases, worse_sentence
 
 _MOST_FAILURES, _MOST_CASES, _MOST_SETTINGS = 8, 40, 24
 _MOST_WARNINGS, _FOR_ASSUMPTIONS = 4, 0.25
@@ -145,18 +145,25 @@ def _draw(page: Page, case: CaseFiles, names: Sequence[str]) -> Page:
 
 
 def _worst(summary: pd.DataFrame) -> str:
-    """The first case with errors. summary : worst first."""
+    """The first case that page 1 calls worse than a guess, else the first with errors. summary : worst first."""
     known = summary[summary[WORST].notna()]
-    worst = (known if len(known) else summary)["case"]
-    return str(worst.iloc[0]) if len(worst) else ""
+    named = known[known["case"].isin(worse_cases(known.to_dict("records")))]
+    worst = next((some["case"] for some in (named, known, summary) if len(some)), None)
+    return "" if worst is None else str(worst.iloc[0])
 
 
 def _worst_case(summary: pd.DataFrame, case: CaseFiles) -> Page:
     """The worst case by its own figures."""
-    before = "" if not len(summary) or case.name == summary["case"].iloc[0] else " of those with errors"
-    page = Page(f"The worst case{before}: {case.name}")
+    head = "The worst case of those with errors"
+    if not len(summary) or case.name == summary["case"].iloc[0]:
+        head = "The worst case"
+    elif case.name in worse_cases(summary.to_dict("records")):
+        head = f"The worst of the cases {WORSE}"
+    page = Page(f"{head}: {case.name}")
     frames = [f"{row['frame']} ({row['text']} mm)" for row in worst_frames({case.name: case.errors}, {})]
     page.text(f"Worst frames by {WORST}: {', '.join(frames)}." if frames else "No frame has an error.")
+    if failed := len(case.errors) - len(case.good):
+        page.text(f"{counted(failed, 'frame')} of it failed.")
     return _draw(page, case, ("projections", "simulated_wires", "error_along_wire"))
 
 

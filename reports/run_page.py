@@ -1,5 +1,6 @@
 """The page of a run over all its cases, built from files on disk, so that it can be built again at any time."""
 
+import shlex
 from collections.abc import Container, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,7 @@ from reports.case_files import (
     not_reached,
     not_run,
     not_run_sentence,
+    provenance_of,
     read_case,
 )
 from reports.case_page import case_failures, scored_or_ok, version_of
@@ -76,10 +78,17 @@ def render_index(out_dir: Path, embed: bool = False, each: Each = one_by_one) ->
         "sweep": _content.grid(files.sweep, SWEEP.columns) if len(files.sweep) else None,
         "sweep_silent": silent_points(files.sweep),
         "config": settings(next((run["config"] for run in infos if "config" in run), {})),
-        "provenance": [(name, list(flatten(run.get("provenance", {})))) for name, run in runs.items()],
+        "provenance": [(n, list(flatten(r.get("provenance", {}))), _made(out_dir / n)) for n, r in runs.items()],
         "version": version_of(infos),
     }
     return write_page("index.html.j2", page, out_dir / "index.html")
+
+
+def _made(run: Path) -> dict[str, str]:
+    """On which day and by which command a run was made, and the file that says so; empty where nothing tells."""
+    path = provenance_of(run)
+    command = shlex.join(typed(path.parent, path.name))
+    return {"day": str(read_json(path).get("started", ""))[:10], "command": command, "file": path.name}
 
 
 def run_files(out_dir: Path, cases: Sequence[CaseFiles]) -> RunFiles:

@@ -25,6 +25,7 @@ def together(runs: tuple[Path, Path], parts: Mapping[str, Verdict], gone: list[s
     rows = pd.concat([*tables, *[pd.DataFrame(lone)] * bool(lone)], ignore_index=True)
     rows = rows[["simulator", *rows.columns.drop("simulator")]]
     empty = tuple(f"{name}: {case}" for name, part in parts.items() for case in part.frames.empty)
+    unscored = dict.fromkeys(case for part in parts.values() for case in part.frames.unscored)
     judged: Judged = "holds"
     for word in ("withheld", "worse"):
         judged = word if any(part.judged == word for part in parts.values()) else judged
@@ -35,7 +36,7 @@ def together(runs: tuple[Path, Path], parts: Mapping[str, Verdict], gone: list[s
         [{"simulator": name, **row} for name, part in parts.items() for row in part.pooled],
         "; ".join(f"{name}: {part.paired}" for name, part in parts.items() if part.paired),
         judged,
-        Difference(rows, empty),
+        Difference(rows, empty, tuple(unscored)),
         _caveats({name: part.caveat for name, part in parts.items()}, several=len(parts) + len(lone) > 1),
         "; ".join(told) if all(told) and not lone else "",
         [{"simulator": name, **row} for name, part in parts.items() for row in part.warned],

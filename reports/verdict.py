@@ -13,7 +13,7 @@ from reports.tips import tips_off
 
 _LISTS = re.compile(r" \([^()]*\b(?:frame|case)s? [^()]*\)")  # frame after frame, which the warning itself has
 _WITHHELD = re.compile(r"withheld: (\d+) insertion")
-_WIDE = "wide: "  # how the note on an interval over few insertions begins
+_FEW = re.compile(r"from (.*) only")  # how the note on an interval over few insertions begins
 
 
 def verdict(statistics: Mapping[str, Any], simulator: str = "", doubt: Doubt = NO_DOUBT) -> str:
@@ -74,7 +74,7 @@ def _far(statistics: Mapping[str, Any], simulator: str, rms: str) -> str:
     some = _of_frames(statistics)
     sentence = f"{f'On {some} alone t' if some else 'T'}{whose} lies {rms} mm (rms) from the traced one"
     few = _over_few(statistics)
-    sentence += f", 95 % interval {ends} mm" + f" (wide: {few})" * bool(few) if ends else ""
+    sentence += f", 95 % interval {ends} mm" + f" (from {few} only)" * bool(few) if ends else ""
     tail = length(statistics.get("p95_mm"))
     return sentence + (f"; 95 % of its points lie within {tail} mm." if tail != NOTHING else ".")
 
@@ -225,8 +225,7 @@ def in_short(statistics: Mapping[str, Any]) -> str:
 
 def _against(statistics: Mapping[str, Any], *, defined: bool) -> tuple[str, str, str]:
     """Whether the skill, and its interval where there is one, is above zero; whose doing a wide interval is; and what
-    else to know where frames failed.
-    """
+    else to know where frames failed."""
     rival, skill, least, _ = _skill(statistics)
     if not rival:
         return "", "", ""
@@ -249,7 +248,8 @@ def _against(statistics: Mapping[str, Any], *, defined: bool) -> tuple[str, str,
 
 # a lost half of an insertion took the partner of "another insertion": 0.926 instead of 0.563
 _WEAKER = (
-    "The skill may flatter: predictors that take wires of other frames or insertions are weaker without the others."
+    "Frames failed, so the predictors 'previous frame' and 'another insertion' had fewer wires to guess from: the "
+    "skill may look better than it is."
 )
 
 
@@ -261,8 +261,8 @@ def _few_insertions(statistics: Mapping[str, Any]) -> str:
 
 def _over_few(statistics: Mapping[str, Any]) -> str:
     """Over how many insertions intervals are, where that makes them wide; else empty."""
-    told = str(statistics.get("interval")).partition("; ")[0]
-    return told.removeprefix(_WIDE) if told.startswith(_WIDE) else ""
+    found = _FEW.fullmatch(str(statistics.get("interval")).partition("; ")[0])
+    return found[1] if found else ""
 
 
 def of_these_alone(statistics: Mapping[str, Any]) -> str:

@@ -42,9 +42,9 @@ def warned(out_dir: Path) -> list[str]:
     return [*(f"warning: {text}" for text in doubted(out_dir)), *lines[:_MANY], *more]
 
 
-def typed(folder: Path) -> Sequence[str]:
-    """The command that wrote a run's or a case's folder; none where nothing tells."""
-    words = read_json(folder / "provenance.json").get("argv", ())
+def typed(folder: Path, name: str = "provenance.json") -> Sequence[str]:
+    """The command that wrote a run's or a case's folder; none where nothing tells. name : that of a shard, say."""
+    words = read_json(folder / name).get("argv", ())
     return [str(word) for word in words] if isinstance(words, list) else ()
 
 

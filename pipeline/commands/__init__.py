@@ -47,11 +47,15 @@ def add_verbosity(parser: argparse.ArgumentParser) -> None:
 
 
 def settings_of(args: argparse.Namespace) -> "list[Setting]":
-    """Settings files first, then --set; raises SettingsError."""
-    from pipeline.study.settings import parse_assignment, read_settings
+    """Settings files first, then --set; raises SettingsError.
+
+    A verb without --parameters takes none, whatever a file of settings was used with.
+    """
+    from pipeline.study.settings import parse_assignment, read_settings, without_parameters
 
     read = [setting for path in args.config for setting in read_settings(path)]
-    return read + [parse_assignment(text) for text in args.settings]
+    given = getattr(args, "parameters", ()) is not None
+    return without_parameters(read, given=given) + [parse_assignment(text) for text in args.settings]
 
 
 def resolved_settings(args: argparse.Namespace) -> "Resolved":

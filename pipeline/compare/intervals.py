@@ -17,7 +17,7 @@ from scipy.special import stdtrit
 from pipeline.model import Array
 
 FEWEST, WIDE_BELOW = 3, 6
-"""Fewest insertions for an interval, and the number below which its note calls it wide."""
+"""Fewest insertions for an interval, and the number below which it is wide, and its note says "only"."""
 SMALLEST_MM = 1e-6
 SMALLEST_MM2 = SMALLEST_MM**2
 """Used in place of an error and a mean square of 0, which have no logarithm: a nanometre is far below any scan."""
@@ -41,7 +41,7 @@ def note(insertions: int) -> str:
     what = f"{insertions} insertion{'s' * (insertions != 1)}"
     if insertions < FEWEST:
         return f"interval withheld: {what}, at least {FEWEST} needed"
-    return f"wide: {what}" if insertions < WIDE_BELOW else f"over {what}"
+    return f"from {what} only" if insertions < WIDE_BELOW else f"over {what}"
 
 
 def in_words(low: float, high: float, said: str) -> str:

@@ -130,6 +130,7 @@ def _points(frame: Frame) -> dict[str, NDArray[Any]]:
     c = frame.comparison
     return {
         "frame": np.full(len(c.arc_mm), frame.index),
+        "status": np.full(len(c.arc_mm), frame.status),
         "arc_mm": c.arc_mm,
         **{f"{axis}_mm": c.sample_mm[:, i] for i, axis in enumerate("xyz")},
         "error_mm": c.error_mm,

@@ -148,13 +148,13 @@ _Seen = tuple[list[Array], list[Array], NDArray[np.bool_]]
 
 
 class _Round(NamedTuple):
-    """A step of the fit: the next values, their covariance, the frames that disagree, how many were used, and how rough
-    their traces are beyond what they state, mm."""
+    """A step of the fit: the next values, their covariance, the frames that disagree, those used, and how rough their
+    traces are beyond what they state, mm."""
 
     goal: Array
     covariance: Array
     out: list[int]
-    used: int
+    used: list[int]
     rough_mm: float
 
 
@@ -208,7 +208,7 @@ class _Fit:
         """The next step; where most frames disagree and their traces are rough, with that as an error of theirs."""
         seen = self.look(at)
         found = self.step(at, seen, self.traces)
-        if len(found.out) < found.used:
+        if len(found.out) < len(found.used):
             return found
         good = [i for i, used in enumerate(seen[2]) if used]
         rough = roughness_mm([seen[0][i] for i in good], [self.traces[i] for i in good], self.voxel_mm)
@@ -222,7 +222,7 @@ class _Fit:
             use = [i for i in range(len(good)) if good[i] and i not in out]
             rough = traces[0].rough_mm
             if not use:
-                return _Round(np.zeros(len(at)), np.diag(self.sigmas**2), out, 0, rough)
+                return _Round(np.zeros(len(at)), np.diag(self.sigmas**2), out, [], rough)
             used = [traces[i] for i in use]
             stacked = [np.concatenate([a[i] for i in use]) for a in (residual, jacobian)]
             noise = covariance_of(used, self.voxel_mm)
@@ -230,7 +230,7 @@ class _Fit:
             mean, spread, left = posterior(stacked[0], stacked[1], noise, self.sigmas, held, at)
             worst = disagreeing(left, used, self.voxel_mm)
             if worst is None or len(use) < 3:
-                return _Round(mean, spread, out, len(use), rough)
+                return _Round(mean, spread, out, use, rough)
             out.append(use[worst])
 
 
@@ -256,8 +256,9 @@ def estimated_clamp(
     found = moved(given, at[:5])
     found = replace(found, covariance=_in_space(given, last.covariance[:5, :5]))
     contradiction = departed(given, found, prior.sigma_mm, prior.direction_sigma_deg)
-    left = left_out({frame.index: frame.curve for frame in chosen}, [chosen[i].index for i in last.out], last.used)
-    told = clamp_told(given, found, left, last.used, contradiction)
+    out, used = ([chosen[i].index for i in which] for which in (last.out, last.used))
+    left = left_out({frame.index: frame.curve for frame in chosen}, out, len(used))
+    told = clamp_told(given, found, left, used, contradiction)
     rough = rougher(last.rough_mm, fit.traces, voxel_mm)
     return replace(told, warning="; ".join(filter(None, (told.warning, rough))))
 

@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 
 from pipeline.arrays.polyline import angle_deg, resample
 from pipeline.model import Clamp, Curve
-from reports.case_files import counted, frames_named
+from reports.case_files import frames_named
 
 REACH_MM = 10.0
 """Length of wire behind the entry that is fitted: a trace's error of 0.02 mm turns it by a tenth of a degree."""
@@ -18,10 +18,11 @@ STEP_MM, DENSE_MM, FROM_OTHERS_MM = 0.5, 0.05, 0.1
 ones lie within 0.02 to 0.06 mm of each other."""
 
 
-def clamp_told(given: Clamp, found: Clamp, left: str, used: int, contradiction: str) -> Clamp:
+def clamp_told(given: Clamp, found: Clamp, left: str, used: Sequence[int], contradiction: str) -> Clamp:
     """The clamp that was found with a note; the given one with a warning where it lies too far off.
 
-    left : see ``left_out``.     contradiction : see ``departures.departed``.
+    left : see ``left_out``.     used : the numbers of the frames that were fitted.     contradiction : see
+    ``departures.departed``.
     """
     shift, turned = float(np.linalg.norm(found.entry_mm - given.entry_mm)), angle_deg(found.direction, given.direction)
     offset = f"{shift:.2f} mm and {turned:.1f} degrees from the manifest's"
@@ -37,7 +38,7 @@ def clamp_told(given: Clamp, found: Clamp, left: str, used: int, contradiction: 
     if not used:
         return replace(found, warning="no frame tells where the wire is held: the manifest's entry was kept")
     note = (
-        f"the clamp was estimated from {counted(used, 'frame')}: the solver's wire fitted to the first {REACH_MM:g} mm "
+        f"the clamp was estimated from {frames_named(used)}: the solver's wire fitted to the first {REACH_MM:g} mm "
         f"of the traces, weighed with the manifest's entry; {offset}, known to {found.sigma_mm:.3f} mm across the "
         f"wire and {found.sigma_deg:.2f} degrees (one standard deviation along each axis; simulate.entry = manifest "
         "switches this off); along the wire, where a straight wire shows nothing, it stays in the manifest's plane"

@@ -57,7 +57,7 @@ def no_wire(image: Subtraction) -> Curve:
     do = "check entry_mm, entry_direction and that the frame shows a wire"
     if _traces_of_wire(image):
         status, allowed = FrameStatus.TRACE_LOW_CONTRAST, "a contrast of 2.5 noises"
-        do = f"{do}; list a frame of a smaller depth before it, or scan with more dose"
+        do = f"{do}; scan with more dose; an ok frame of a smaller depth before it helps, too"
     got = f"nothing that stands out of {image.noise:.0f} grey of noise and passes the entry"
     if (own := _of_the_scan(image)) < OWN_NOISE * image.noise:
         got += (

@@ -4,8 +4,8 @@
 
     wireval.check("study/manifest.toml")                          # [] where nothing is wrong
     results = wireval.run("study/manifest.toml", "out", jobs=2)
-    results.errors.plot(x="insertion_mm", y="rms_mm")
-    worst = results.errors.nlargest(1, "p95_mm").iloc[0]          # the tutorial draws it
+    good = results.errors[results.errors["status"] == "ok"]       # the frames that count
+    worst = good.nlargest(1, "p95_mm").iloc[0]                    # the tutorial draws it
     case = results.cases[worst.case]                              # CaseFiles: .result, .errors, .scan, .folder, ...
     case.read_frame(worst.frame).curves                           # FrameArrays: the wires; .mips, .error_mm, ...
     wireval.wall_of(case)                                         # the lumen of this case, for the solver alone

@@ -75,7 +75,10 @@ class Results:
 
     @property
     def points(self) -> pd.DataFrame:
-        """Every compared point of all cases; read when asked for, since it is by far the largest table."""
+        """Every compared point of all cases; read when asked for, since it is by far the largest table.
+
+        Also those of frames that count in no score: ``points[points["status"] == "ok"]`` are pooled.
+        """
         return _of_all({n: case.points for n, case in self.cases.items() if n not in self.damaged}, POINTS)
 
     def __repr__(self) -> str:

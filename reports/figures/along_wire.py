@@ -1,5 +1,7 @@
 """Heat maps: a quantity along the wire (across) for every frame (up)."""
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 from matplotlib.colors import ListedColormap, Normalize
@@ -32,7 +34,13 @@ def contact_along_wire(case: CaseFiles) -> Drawing | None:
     points = case.points if has(case.points, "contact_force_N") else _joints(case)
     known = points["contact_force_N"].dropna()
     most = float(np.percentile(known, _CLIP_PERCENTILE)) if len(known) else 0.0
-    return _along_wire(points, "contact_force_N", "contact force, N", Normalize(0.0, max(most, 1e-9)), zero=_NO_FORCE)
+    scale = Normalize(0.0, max(most, 1e-9))
+    drawing = _along_wire(points, "contact_force_N", "contact force, N", scale, zero=_NO_FORCE)
+    if drawing is None:
+        return None
+    # the wires of refused frames are shown, too
+    status = drawing.table["frame"].map(case.errors.set_index("frame")["status"])
+    return replace(drawing, table=drawing.table.assign(status=status))
 
 
 def _joints(case: CaseFiles) -> pd.DataFrame:

@@ -69,7 +69,8 @@ def _by_entry(axes: Axes, table: pd.DataFrame) -> None:
     rows = zip(table["clamp"], table["depth"], strict=True)
     axes.set_yticks(places, [f"clamp {clamp},\ndepth {depth}" for clamp, depth in rows], fontsize=8)
     axes.set_ylim(len(table) - 0.5, -0.5)
-    axes.set_xlim(left=0.0)
+    most = float(np.nanmax(table[["rms_mm", "distal10_rms_mm", "tip_median_mm"]].to_numpy(dtype=float)))
+    axes.set_xlim(0.0, 1.1 * most or None)  # marks at the right end are whole, however near to each other they are
     axes.set_xlabel("distance to the traced wire, mm")
     plain(axes)
     legend(axes, ncols=3, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.1, columnspacing=0.8)

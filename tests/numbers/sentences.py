@@ -75,7 +75,9 @@ def verdicts() -> Numbers:
             "frames_ok": one_of(rng, 4, 5),
             "frames": one_of(rng, 5, 6),
             "frames_fitted": one_of(rng, 0, 1, NAN),
-            "interval": one_of(rng, "", "wide: 3 insertions; skill_strongest_low", "interval withheld: 1 insertion,"),
+            "interval": one_of(
+                rng, "", "from 3 insertions only; skill_strongest_low", "interval withheld: 1 insertion,"
+            ),
         }
         rows.append((row, one_of(rng, "", "wireval", "other")))
     return together(

@@ -811,6 +811,7 @@ def test_a_wire_that_is_thin_in_its_voxels_is_warned_of():
     """In scans alone: own curves were not traced here."""
 
     assert flattened(of_voxels(0.375)) == []
+    assert flattened(of_voxels(float(np.float32(0.4)))) == [], "it said 0.90, and too thin below 0.9"
     assert "a: the wire's diameter is 0.48 voxels" in flattened(of_voxels(0.75))[0]
     assert flattened(of_voxels(0.75, frames=("scan",), traces=("curve",))) == []
 

@@ -15,12 +15,14 @@ import pytest
 from pipeline.arrays.polyline import angle_deg, at_arc
 from pipeline.model import Array, Clamp, Curve
 from pipeline.run.stages.clamp import clamp_of
-from pipeline.run.stages.given import manifest_clamp
+from pipeline.run.stages.given import manifest_clamp, seen_in
+from pipeline.run.stages.known import Frame
 from pipeline.simulate import together
 from pipeline.simulate.clamp import Prior, TracedFrame, depth_from, estimated_clamp, moved
 from pipeline.simulate.clamp_told import left_out
 from pipeline.simulate.evidence import TraceSamples, posterior, roughness_mm, sigma_across
 from pipeline.simulate.way import Stop, Way
+from pipeline.status import FrameStatus
 from solver import GuideWire, Insertion, Solution
 from solver.relax import base_frame
 
@@ -242,6 +244,15 @@ def test_an_exact_entry_beside_the_traced_wires_is_told(
     assert ("mm beside the manifest's entry (median of 3 frames)" in said) == doubted, said
 
 
+def test_frames_that_show_no_wire_fit_no_clamp() -> None:
+    """Lines in the noise of four frames without a wire made the clamp surer, and the right rms threefold."""
+    right, noise = (Curve(free_wire(mm), np.full(round(mm / VOXEL_MM), 0.02), 0.01) for mm in (20.0, 30.0))
+    frames = [Frame(0), Frame(1)]
+    refused = noise.doubted(FrameStatus.TRACE_LOW_CONTRAST, "30 mm of line, 0.7 noises bright")
+    traced = [frame.traced_by(curve) for frame, curve in zip(frames, (right, refused), strict=True)]
+    assert [frame.index for frame in seen_in(traced)] == [0]
+
+
 def test_depth_is_counted_from_the_clamp() -> None:
     curve = trace(20.0, 0.0, np.random.default_rng(0))
     assert depth_from(off(0.0, (0.0, 0.0, 0.0)), curve) == pytest.approx(curve.length_mm)
@@ -275,7 +286,7 @@ def test_rough_traces_are_told_as_such_and_kept() -> None:
         points[1:] += 0.03 * rng.normal(size=points[1:].shape)
         curves.append(Curve(points, np.full(len(points), np.nan)))
     found = estimate(curves, off(0.2))
-    assert "8 frames: the solver" in found.note, "all are kept"
+    assert "frames 0, 1, 2, 3, 4, 5, 6, 7: the solver" in found.note, "all are kept"
     assert "scatter by 0.02" in found.warning
     assert "where a standard deviation of 0.045 mm leaves 0.01 mm" in found.warning
     assert "entry_mm" not in found.warning

@@ -88,7 +88,7 @@ def test_guesses_that_all_hang_on_one_insertion_have_no_interval(count: int) -> 
     assert (result["strongest_null"], result["strongest_insertions"]) == ("another", count)
     assert np.isnan([result["skill_strongest_low"], result["skill_strongest_high"]]).all()
     withheld = "skill_strongest interval withheld: without a no frame has a guess"
-    assert result["interval"] == f"wide: {count} insertions; {withheld}"
+    assert result["interval"] == f"from {count} insertions only; {withheld}"
     frames.append(frames[-1]._replace(guesses={"b": (6.0, 6)}))
     assert pooled(frames)["skill_strongest_low"] < pooled(frames)["skill_strongest"]
 
@@ -106,8 +106,8 @@ def test_steps_from_frame_to_frame_are_those_within_a_case() -> None:
     [
         (1, "interval withheld: 1 insertion, at least 3 needed"),
         (2, "interval withheld: 2 insertions, at least 3 needed"),
-        (3, "wide: 3 insertions"),
-        (5, "wide: 5 insertions"),
+        (3, "from 3 insertions only"),
+        (5, "from 5 insertions only"),
         (6, "over 6 insertions"),
     ],
 )
@@ -180,7 +180,7 @@ def test_an_interval_holds_its_value_and_is_never_infinite(near: int, scale: flo
         for end, beyond in ((low, result[low] > result[name]), (high, result[high] < result[name])):
             assert not beyond, end
             assert np.isfinite(result[end]) != (end in result["interval"]), end
-    assert result["interval"].startswith("wide: 4 insertions")
+    assert result["interval"].startswith("from 4 insertions only")
 
 
 def test_an_error_of_nothing_beside_one_of_millimetres_bounds_nothing() -> None:

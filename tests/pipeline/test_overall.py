@@ -72,7 +72,7 @@ def test_one_population_everywhere(study: Path) -> None:
     assert (whole["frames"], whole["frames_ok"], whole["insertions"]) == (9, 7, 4)
     line = last_line(totals, study / "index.html")
     assert f"median point error {np.median(good):.3f} mm" in line
-    interval = f"95 %: {whole['rms_low_mm']:.3f} to {whole['rms_high_mm']:.3f}, wide: 4 ins"
+    interval = f"95 %: {whole['rms_low_mm']:.3f} to {whole['rms_high_mm']:.3f}, from 4 ins"
     assert f"rms {rms:.3f} mm over the 4 cases that are scored ({interval}" in line
     one = replace(totals, pooled={**totals.pooled, "cases": 1})
     assert "mm over the 1 case that is scored (" in last_line(one, study / "index.html")
@@ -150,7 +150,7 @@ def test_a_trace_is_trusted_whatever_the_solver_said_of_its_wire(study: Path) ->
 
 
 def test_a_skill_over_fewer_insertions_says_so(study: Path) -> None:
-    """``wide: 4 insertions`` stood beside a skill of two of them, which had no interval and did not say why."""
+    """``from 4 insertions only`` stood beside a skill of two of them, which had no interval and did not say why."""
     for name in ("c", "d"):
         path = study / "cases" / name / "errors.csv"
         errors = pd.read_csv(path)
@@ -162,7 +162,7 @@ def test_a_skill_over_fewer_insertions_says_so(study: Path) -> None:
     assert (whole["insertions"], whole["strongest_null"], whole["strongest_insertions"]) == (4, "previous", 2)
     assert np.isnan(whole["skill_strongest_low"])
     withheld = "skill_strongest interval withheld: 2 insertions, at least 3 needed"
-    assert whole["interval"] == f"wide: 4 insertions; {withheld}"
+    assert whole["interval"] == f"from 4 insertions only; {withheld}"
     aggregate(study, {})
     assert "(no interval: 2 insertions)" in render_index(study).read_text(encoding="utf-8")
 
@@ -202,7 +202,7 @@ def test_two_runs_are_compared_on_the_frames_that_both_have(
     assert found.frames == 6
     assert (found.value, found.low, found.high) == pytest.approx((2.0, 2.0, 2.0))
     assert main(["diff", str(study), str(other)]) == 1
-    said = "rms of the second run / the first, on 6 frames: 2.000 (95 %: 2.000 to 2.000, wide: 4 insertions)"
+    said = "rms of the second run / the first, on 6 frames: 2.000 (95 %: 2.000 to 2.000, from 4 insertions only)"
     assert said in capsys.readouterr().out
 
 

@@ -86,7 +86,7 @@ def test_the_first_insertion_is_the_study_of_one(study: Path, tmp_path: Path) ->
 
 def test_the_row_over_all_rests_on_the_insertions(out: Path) -> None:
     whole = pd.read_csv(out / "overall.csv").iloc[0]
-    assert (whole["insertions"], whole["interval"]) == (INSERTIONS, f"wide: {INSERTIONS} insertions")
+    assert (whole["insertions"], whole["interval"]) == (INSERTIONS, f"from {INSERTIONS} insertions only")
     assert whole["rms_low_mm"] < whole["rms_mm"] < whole["rms_high_mm"]
     assert whole["null_another_rms_mm"] > 0
     for name in ("roll_unknown", "no_tip_curve", "pinned", "neighbours"):

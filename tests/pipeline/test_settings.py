@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import argparse
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -9,7 +11,7 @@ import numpy as np
 import pytest
 
 from pipeline import load
-from pipeline.commands import complain
+from pipeline.commands import complain, settings_of
 from pipeline.model import Curve, Lumen, Volume
 from pipeline.run import store as store_keys
 from pipeline.run.cache import Store
@@ -42,6 +44,20 @@ def test_resolved_settings_read_back(tmp_path: Path) -> None:
     path = tmp_path / "config.resolved.toml"
     path.write_text(to_toml(resolved), encoding="utf-8")
     assert resolve(read_settings(path)).config == resolved.config
+
+
+def test_settings_that_were_used_with_parameters_ask_for_these(tmp_path: Path) -> None:
+    """Read back, they ran uncalibrated without a word: rms 0.217 for 0.026 mm."""
+    path = tmp_path / "config.resolved.toml"
+    path.write_text(to_toml(replace(resolve([]), calibrated=("0a1b", 'cal "1"/p.toml'))), encoding="utf-8")
+    words = argparse.Namespace(config=[path], settings=["solver.segment_mm=0.25"], parameters=None)
+    with pytest.raises(SettingsError, match=r'config.resolved.toml: .* say --parameters cal "1"/p.toml, too, or take'):
+        settings_of(words)
+    words.parameters = tmp_path / "p.toml"
+    config = resolve(settings_of(words)).config
+    assert config == resolve([parse_assignment("solver.segment_mm=0.25")]).config
+    del words.parameters  # as of check and calibrate
+    assert resolve(settings_of(words)).config == config
 
 
 @pytest.mark.parametrize(

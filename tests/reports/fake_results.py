@@ -79,7 +79,7 @@ def write_run(out: Path, cases: tuple[FakeCase, ...], sweep: bool = False) -> Pa
 def _overall(summaries: list[dict[str, Any]]) -> dict[str, Any]:
     counts = {name: sum(row[name] for row in summaries) for name in ("frames", "frames_ok", "frames_failed")}
     ends = {"rms_mm": 0.25, "rms_low_mm": 0.2, "rms_high_mm": 0.31}
-    return {"case": "(all)", **counts, **ends, "insertions": 4, "interval": "wide: 4 insertions"}
+    return {"case": "(all)", **counts, **ends, "insertions": 4, "interval": "from 4 insertions only"}
 
 
 def _depths(case: FakeCase) -> np.ndarray:

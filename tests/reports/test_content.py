@@ -75,7 +75,7 @@ def test_a_tile_says_that_its_interval_is_withheld() -> None:
     assert tip == "tip_median_mm"
     bounded = withheld | {"rms_low_mm": 0.1, "rms_high_mm": 0.3}
     assert _content.cards(entries, bounded)[0]["label"] == "rms_mm (95 %: 0.100 to 0.300)"
-    for note in (None, "wide: 4 insertions; not bounded: rms_low_mm"):
+    for note in (None, "from 4 insertions only; not bounded: rms_low_mm"):
         assert _content.cards(entries, row | {"interval": note})[0]["label"] == "rms_mm"
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 from pathlib import Path
 
@@ -130,6 +131,21 @@ def test_folders_against_themselves_and_against_a_worse_copy(tmp_path: Path) -> 
     assert tip["regressions"] == 1
     (path).unlink()
     assert len(diff.diff_folders(out, worse, tolerance).regressions) == 3, "every frame of the case is missing"
+
+
+def test_a_calibration_case_of_one_run_alone_is_named_and_not_compared(tmp_path: Path) -> None:
+    """A calibrated run leaves them out itself: its diff with the run before was WORSE, case present -> missing."""
+    learnt, judged = FakeCase("c", frames=3, role="calibration"), FakeCase("d", frames=3)
+    out, calibrated = write_run(tmp_path / "a", (learnt, judged)), write_run(tmp_path / "b", (judged,))
+    told = "1 case compared: no regression; not compared, since one run alone has them and they count in no score: c"
+    for pair in ((out, calibrated), (calibrated, out)):
+        found = diff.diff_folders(*pair, load_tolerance())
+        assert found.regressions.empty
+        assert found.sentence == told
+    (calibrated / "run.json").write_text(json.dumps({"planned": ["c", "d"]}), encoding="utf-8")
+    assert len(diff.diff_folders(out, calibrated, load_tolerance()).regressions) == 1, "it was to be computed"
+    other = write_run(tmp_path / "other", (learnt,))
+    assert len(diff.diff_folders(out, other, load_tolerance()).regressions) == 1, "a case that is scored is missing"
 
 
 def test_a_folder_without_cases_is_no_reference(tmp_path: Path) -> None:

@@ -191,6 +191,17 @@ def test_no_force_is_another_colour_than_a_little_one(tmp_path: Path) -> None:
     assert none.count() + forces.count() == len(drawing.table)
 
 
+def test_a_table_of_forces_tells_refused_frames_from_others(tmp_path: Path) -> None:
+    case = _heat_case(tmp_path)
+    assert case.samples is not None
+    errors = pd.DataFrame({"frame": [0, 2], "status": ["ok", "no_wire"]})
+    forces = case.samples.assign(contact_force_N=1.0)
+    drawing = CASE_FIGURES["contact_along_wire"](replace(case, samples=forces, errors=errors))
+    assert drawing is not None
+    told = {*zip(drawing.table["frame"], drawing.table["status"], strict=True)}
+    assert told == {(0, "ok"), (2, "no_wire")}
+
+
 def test_heat_map_shows_each_sample_at_its_place(tmp_path: Path) -> None:
     drawing = CASE_FIGURES["error_along_wire"](_heat_case(tmp_path))
     assert drawing is not None
@@ -379,6 +390,15 @@ def test_a_budget_is_drawn_by_source_and_by_entry(tmp_path: Path) -> None:
     assert len(both.figure.axes) == 2
     handed_in = replace(case, result={"inputs": [{"key": "simulated.files[0]", "path": "a.csv", "sha256": ""}]})
     assert CASE_FIGURES["budget"](handed_in) is None, "it is of our solver's wire"
+
+
+def test_marks_at_the_end_of_four_entries_are_whole(tmp_path: Path) -> None:
+    """Four like distances far from 0 had a margin of a twentieth of their range: squares were cut by the frame."""
+    far = dict.fromkeys(("rms_mm", "distal10_rms_mm", "tip_median_mm"), 0.15)
+    tables.write(tmp_path / "entries.csv", ENTRIES, [{"clamp": "manifest", "depth": "traced"} | far])
+    drawing = CASE_FIGURES["budget"](_empty_case(tmp_path))
+    assert drawing is not None
+    assert drawing.figure.axes[0].get_xlim() == pytest.approx((0.0, 0.165))
 
 
 def test_only_what_was_computed_of_a_budget_is_drawn(tmp_path: Path) -> None:

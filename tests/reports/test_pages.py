@@ -18,7 +18,7 @@ from reports import figures, tables
 from reports.case_files import find_cases, read_case
 from reports.case_page import render_case
 from reports.figures import Drawing, declared, figures_of
-from reports.run_page import render_index
+from reports.run_page import _made, render_index
 from reports.schema import ERRORS, FAILURES, SUMMARY
 from tests.reports.fake_results import EVERY_KIND, FakeCase, write_run
 from tests.unseen import scarce as scarce
@@ -95,6 +95,15 @@ def test_every_link_leads_somewhere(run: Path) -> None:
                 assert link[1:] in links.ids, (page, link)
             else:
                 assert (page.parent / unquote(link).partition("#")[0]).exists(), (page, link)
+
+
+def test_the_first_page_says_when_and_how_it_was_made(run: Path, tmp_path: Path) -> None:
+    page = (run / "index.html").read_text(encoding="utf-8")
+    assert 'Made by <code>wireval run manifest.toml -o out</code> (<a href="provenance.json">' in page
+    told = {"argv": ["wireval", "run", "my study"], "started": "2026-11-30T02:33:44+00:00"}
+    (tmp_path / "provenance.1-2.json").write_text(json.dumps(told), encoding="utf-8")
+    made = {"day": "2026-11-30", "command": "wireval run 'my study'", "file": "provenance.1-2.json"}
+    assert _made(tmp_path / "run.1-2.json") == made
 
 
 def test_each_kind_of_case_has_its_sections(run: Path) -> None:

@@ -31,7 +31,7 @@ def test_the_verdict_follows_the_strongest_rival(skill: float, low: float | None
     text = verdict(row | {"skill_strongest_low": low})
     assert text.startswith("The simulated wire lies 0.250 mm (rms) from the traced one; 95 % of its points lie within")
     # a newcomer is told what "roll unknown" means
-    rival = "the simulator that does not know the roll, mean of 12 wires 30 degrees apart."
+    rival = "wireval's own solver, which is not told the roll: the mean of 12 wires 30 degrees apart."
     assert text.endswith(f"{said}the strongest trivial predictor: {rival}")
 
 
@@ -64,7 +64,7 @@ def test_a_skill_of_one_insertion_says_nothing_of_others() -> None:
     assert of_these_alone(row | {"interval": alone}).startswith("One insertion says nothing about others: scan")
     two = {"interval": alone.replace("1 insertion", "2 insertions")}
     assert of_these_alone(row | two).startswith("2 insertions say nothing")
-    assert not of_these_alone(row | {"interval": "wide: 3 insertions"})
+    assert not of_these_alone(row | {"interval": "from 3 insertions only"})
     assert not of_these_alone(row | {"interval": alone, "skill_strongest": -0.1}), "that is worse, of whatever"
 
 
@@ -125,7 +125,7 @@ def test_no_green_badge_beside_a_negative_skill(skill: float | None, low: float 
 def test_a_wide_interval_of_few_insertions_is_no_fault_of_the_wire() -> None:
     """Over three insertions skills of 0.97, 0.44 and 0.07 had one badge, and a better wire no other than a worse."""
     row = {"skill_strongest": 0.97, "skill_strongest_low": -0.1, "strongest_null": "previous"}
-    told = row | {"interval": "wide: 3 insertions"}
+    told = row | {"interval": "from 3 insertions only"}
     assert badge("ok", True, told) == {"text": "skill 0.970: too few insertions to tell from a guess", "look": "poor"}
     assert badge("ok", True, told | {"skill_strongest": 0.07})["text"].startswith("skill 0.0700: too few insertions")
     assert badge("ok", True, told | {"skill_strongest": -0.1})["text"] == "no better than a guess"
@@ -184,7 +184,7 @@ def test_the_verdict_says_of_how_many_planned_frames_it_speaks() -> None:
     assert verdict(row).startswith("On 6 of 12 planned frames alone the simulated wire lies 0.200 mm"), "it came last"
     assert "On these frames the wire is better (skill 0.900) than" in verdict(row)
     assert "The wire is better (skill 0.900) than" in verdict(row | {"frames_ok": 12})
-    assert "weaker without the others" in verdict(row)
+    assert "had fewer wires to guess from: the skill may look better than it is." in verdict(row)
     assert "planned" not in verdict(row | {"frames_ok": 12})
 
 
@@ -248,14 +248,14 @@ def test_a_page_begins_with_three_sentences_and_says_each_definition_once() -> N
         "skill_strongest": 0.5,
         "skill_strongest_low": -0.1,
         "strongest_null": "another",
-        "interval": "wide: 3 insertions",
+        "interval": "from 3 insertions only",
     }
     said, more = headline(row, defined=False)
     assert (
         "On these frames it is not shown to be better (skill 0.500, its interval reaches -0.100) than "
         "the predictor 'another insertion'."
     ) in said
-    assert said.endswith("weaker without the others."), "whether it may be quoted was behind a click"
+    assert said.endswith("may look better than it is."), "whether it may be quoted was behind a click"
     assert "there the model is wrong, or an input is less certain than stated." in said
     assert len(more) == 2
     assert verdict(row).count(". ") > 4
@@ -304,7 +304,7 @@ def test_no_error_no_verdict_and_intervals_where_there_are_any() -> None:
 
 def test_an_end_that_nothing_bounds_is_no_better() -> None:
     """The field is empty as that of an interval that is withheld, and means the opposite."""
-    row = {"rms_mm": 0.25, "skill_strongest": 0.9, "strongest_null": "previous", "interval": "wide: 4 insertions"}
+    row = {"rms_mm": 0.25, "skill_strongest": 0.9, "strongest_null": "previous", "interval": "from 4 insertions only"}
     assert "The wire is better" in verdict(row)
     row["interval"] += "; not bounded: rms_high_mm, skill_strongest_low"
     assert "It is not shown to be better (skill 0.900, its interval has no lower end)" in verdict(row)
@@ -384,6 +384,6 @@ def test_a_case_that_lies_far_off_is_named(rms_mm: float, said: str) -> None:
 def test_a_wide_interval_is_said_to_be_the_doing_of_few_insertions() -> None:
     """With three insertions a wire of a fifth of the error of the best guess was "not shown to be better"."""
     row = {"rms_mm": 0.085, "skill_strongest": 0.96, "strongest_null": "another", "skill_strongest_low": -3.2}
-    assert "Intervals over 3 insertions are wide" in verdict(row | {"interval": "wide: 3 insertions"})
+    assert "Intervals over 3 insertions are wide" in verdict(row | {"interval": "from 3 insertions only"})
     assert "are wide" not in verdict(row | {"interval": "over 8 insertions"})
-    assert "are wide" not in verdict(row | {"interval": "wide: 3 insertions", "skill_strongest_low": 0.4})
+    assert "are wide" not in verdict(row | {"interval": "from 3 insertions only", "skill_strongest_low": 0.4})

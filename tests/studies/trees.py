@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 TIMING = ("timings.csv", "provenance.json", "log.txt", "figures/run_time.png", "figures/run_time.csv")
 """When, where and how long: what differs between two runs of the same."""
+MADE = re.compile(rb'<p class="made">.*?</p>')
 
 
 def is_timing(name: str) -> bool:
@@ -14,11 +16,16 @@ def is_timing(name: str) -> bool:
 
 
 def files_of(out: Path) -> dict[str, bytes]:
-    """Every file by its name; of a ledger the lines on timing files are left out."""
+    """Every file by its name; left out are a ledger's lines on timing files, and a first page's on when and how it was
+    made.
+    """
     found = {path.relative_to(out).as_posix(): path.read_bytes() for path in out.rglob("*") if path.is_file()}
-    return {
-        name: without_timing(content) if name.endswith("ledger.json") else content for name, content in found.items()
-    }
+    for name, content in found.items():
+        if name.endswith("ledger.json"):
+            found[name] = without_timing(content)
+        elif name.endswith("index.html"):
+            found[name] = MADE.sub(b"", content)
+    return found
 
 
 def without_timing(ledger: bytes) -> bytes:

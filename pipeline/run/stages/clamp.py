@@ -10,7 +10,7 @@ from pipeline.model import Clamp
 from pipeline.run.calibrated import data_of
 from pipeline.run.log import Log
 from pipeline.run.stages.given import manifest_clamp, seen_in
-from pipeline.run.stages.known import Context, Frame, Known, trusted
+from pipeline.run.stages.known import Context, Frame, Known
 from pipeline.run.stages.load import open_case
 from pipeline.run.stages.roll import with_fitted_roll
 from pipeline.run.stages.segment import segment_vessel
@@ -32,7 +32,7 @@ SHORT_MM = 0.125
 def clamp_of(run: Context, known: Known) -> Clamp:
     """The clamp of the simulation: estimated from the scans, or the manifest's."""
     given, prior, voxel_mm = manifest_clamp(run, known)
-    seen = seen_in(known.frames) if trusted(known.frames) else []
+    seen = seen_in(known.frames)
     passed = beside([frame.curve for frame in seen], given, prior.sigma_mm, voxel_mm) if not known.off_the_scans else ""
     if run.config.simulate.entry == "manifest":
         run.log.warnings += [passed] * bool(passed)

@@ -6,11 +6,10 @@ import numpy as np
 
 from pipeline.budget.inputs import ROLL_DEG
 from pipeline.calibrate.trials import Trial
-from pipeline.model import Clamp, Curve
+from pipeline.model import Clamp
 from pipeline.run.stages.known import Context, Frame, Known
 from pipeline.run.stages.way import passed_at
 from pipeline.simulate.clamp import Prior, TracedFrame
-from pipeline.status import FrameStatus
 from solver import VesselWall
 
 ENTRY_SIGMA_VOXELS = 0.5
@@ -18,17 +17,15 @@ ENTRY_SIGMA_VOXELS = 0.5
 
 
 def seen_in(frames: Sequence[Frame]) -> list[TracedFrame]:
-    """The frames whose traces can be trusted near the entry."""
+    """The frames whose traces can be trusted.
+
+    Not those of too low a contrast: a line in noise, where there is no wire, begins at the entry, too.
+    """
     return [
         TracedFrame(frame.index, curve, frame.roll_deg, frame.catheter_mm)
         for frame in frames
-        if (curve := frame.trusted_curve or _faint(frame)) is not None
+        if (curve := frame.trusted_curve) is not None
     ]
-
-
-def _faint(frame: Frame) -> Curve | None:
-    """The curve of a frame of too low a contrast: its tip may be missed, its beginning is as good as its sigma says."""
-    return frame.curve if frame.traced and frame.status == FrameStatus.TRACE_LOW_CONTRAST.identifier else None
 
 
 def manifest_clamp(run: Context, known: Known) -> tuple[Clamp, Prior, float]:
