@@ -8,7 +8,7 @@ from reports import _content
 from reports._content import flatten, settings
 from reports.alike import alike
 from reports.case_files import GOOD, CaseFiles, counted, counted_scans, read_case, runs_in
-from reports.doubts import Doubt, copied_from_traces, weightiest_first
+from reports.doubts import Caveats, copied_from_traces, weightiest_first
 from reports.figures import declared
 from reports.listing import listed_files, listed_view
 from reports.page import Each, begun_first, longest, one_by_one, section, write_page
@@ -31,13 +31,13 @@ def render_case(case_dir: Path, embed: bool = False, each: Each = one_by_one) ->
     case = read_case(case_dir)
     result, errors = case.result, case.errors
     failures, warnings = case_failures(case), weightiest_first(result.get("warnings", ()))
-    doubt = Doubt(copied_from_traces({case.name: warnings}), warnings=warnings)
+    caveats = Caveats(copied_from_traces({case.name: warnings}), warnings=warnings)
     frames = _content.grid(errors, ERRORS.shown("frames", "work"), bad=~errors["status"].isin(GOOD))
     page = {
         "title": " - ".join(filter(None, (case.name, case.simulator, "wireval"))),
         "name": case.name,
-        "badge": badge(result.get("status", "no result.json"), result.get("status") in GOOD, _scored(case), doubt),
-        **_case_verdict(case, doubt),
+        "badge": badge(result.get("status", "no result.json"), result.get("status") in GOOD, _scored(case), caveats),
+        **_case_verdict(case, caveats),
         "worst": worst_frames({case.name: errors}, {}),
         "next": next_command([case.name], typed(case_dir)),
         **_drawn(case, embed, each),
@@ -93,7 +93,7 @@ def _scored(case: CaseFiles) -> Mapping[str, Any]:
     return {} if case.result.get("role") == "calibration" else case.statistics
 
 
-def _case_verdict(case: CaseFiles, doubt: Doubt) -> dict[str, Any]:
+def _case_verdict(case: CaseFiles, caveats: Caveats) -> dict[str, Any]:
     """What became of the case, how many frames have a result, and how good they are; what more there is to know.
 
     Where some have none, why stands below, with the frames and the next command: said here, too, it read as if it were
@@ -103,14 +103,14 @@ def _case_verdict(case: CaseFiles, doubt: Doubt) -> dict[str, Any]:
     said = str(case.result.get("sentence", nothing)).strip().rstrip(".")
     scored = _scored(case)
     judges = bool(scored) or not case.statistics
-    how, more = headline(scored, case.simulator, doubt) if judges else (OF_CALIBRATION, [])
+    how, more = headline(scored, case.simulator, caveats) if judges else (OF_CALIBRATION, [])
     good, planned = case.statistics.get("frames_ok"), case.statistics.get("frames")
     became = said[:1].upper() + said[1:] + "."
     if fitted := case.statistics.get("frames_fitted"):
         became = counted_scans(good or 0, planned or 0, fitted, scored_or_ok([case])) + "."
     elif planned and good != planned:
         became = "" if how.startswith("On ") else f"{good} of {counted(planned, 'frame')} have a result."
-    judged = bool(how) and not doubt.copied and _content.number(scored.get("skill_strongest")) != _content.NOTHING
+    judged = bool(how) and not caveats.copied and _content.number(scored.get("skill_strongest")) != _content.NOTHING
     ids = {name for run in runs_in(case.folder.parents[1]) for name in run.get("planned") or ()}
     alone = "The predictor 'another insertion' may be stronger; it is judged over the run, on its first page."
     alone *= judged and len(ids) != 1

@@ -31,7 +31,7 @@ AGAINST_INPUTS = (
 _OTHERS = 2
 
 
-class Doubt(NamedTuple):
+class Caveats(NamedTuple):
     """Why the numbers may not mean what they say.
 
     copied : the warning that the wires were made from the traces, so that no number counts; empty if there is none.
@@ -54,7 +54,7 @@ class Doubt(NamedTuple):
         return any(words in text for text in self.warnings for words in (OFF_THE_SCANS, MOSTLY_LINES))
 
 
-NO_DOUBT = Doubt()
+NO_CAVEATS = Caveats()
 
 
 def weightiest_first(warnings: Iterable[str]) -> list[str]:
@@ -114,16 +114,16 @@ def said_by_cases(results: Mapping[str, Mapping[str, Any]], key: str) -> list[st
     return lines
 
 
-def doubt_of(out_dir: Path, results: Mapping[str, Mapping[str, Any]]) -> Doubt:
+def caveats_of(out_dir: Path, results: Mapping[str, Mapping[str, Any]]) -> Caveats:
     """What is warned of on a run's page: of its cases among themselves, then of each. results : result.json by case."""
     doubts, copied = doubted(out_dir), {case: result.get("warnings", ()) for case, result in results.items()}
     said = weightiest_first([*doubts, *said_by_cases(results, "warnings")])
-    return Doubt(copied_from_traces(copied), twins(doubts), said)
+    return Caveats(copied_from_traces(copied), twins(doubts), said)
 
 
-def doubt_in(out_dir: Path) -> Doubt:
+def caveats_in(out_dir: Path) -> Caveats:
     """What is warned of on a run's page, from its folder alone."""
-    return doubt_of(out_dir, results_in(out_dir))
+    return caveats_of(out_dir, results_in(out_dir))
 
 
 def doubted(out_dir: Path) -> list[str]:

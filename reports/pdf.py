@@ -21,7 +21,7 @@ from reports.case_files import (
     read_case,
     results_in,
 )
-from reports.doubts import assumed, doubt_of, said_by_cases
+from reports.doubts import assumed, caveats_of, said_by_cases
 from reports.figures import declared, figures_of
 from reports.gates import gates_in
 from reports.origin import why_not_pooled
@@ -76,8 +76,8 @@ def _first(out_dir: Path, summary: pd.DataFrame, whole: pd.DataFrame) -> Page:
     cases = zip(summary["role"], summary["status"], strict=True)
     results = results_in(out_dir)
     simulator = next((name for one in results.values() if (name := str(one.get("simulator", "")))), "")
-    doubt = doubt_of(out_dir, results)
-    said = verdict(row, simulator, doubt) or why_not_pooled(out_dir) or unscored(cases) or not_reached(out_dir)
+    caveats = caveats_of(out_dir, results)
+    said = verdict(row, simulator, caveats) or why_not_pooled(out_dir) or unscored(cases) or not_reached(out_dir)
     frames = f"{ok} of {counted(planned, 'frame')} have a result"
     if fitted := int(summary["frames_fitted"].sum()):
         frames = counted_scans(ok, planned, fitted, "with a result")
@@ -93,7 +93,7 @@ def _first(out_dir: Path, summary: pd.DataFrame, whole: pd.DataFrame) -> Page:
     for tile in _content.in_tiles(_content.overall(declared("overall"), whole))["tiles"]:
         why = f". {tile['why']}" if "why" in tile else ""
         page.text(f"{tile['value']}  {tile['label']}{why}")
-    page.some("Warnings", doubt.warnings, "on the pages of the cases", _MOST_WARNINGS)
+    page.some("Warnings", caveats.warnings, "on the pages of the cases", _MOST_WARNINGS)
     return page
 
 

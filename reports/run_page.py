@@ -27,7 +27,7 @@ from reports.case_files import (
     read_case,
 )
 from reports.case_page import case_failures, scored_or_ok, version_of
-from reports.doubts import assumed, doubt_of
+from reports.doubts import assumed, caveats_of
 from reports.figures import RunFiles, declared
 from reports.gates import gates_in
 from reports.origin import why_not_pooled
@@ -179,10 +179,10 @@ def _judged(
     out_dir: Path, cases: Sequence[CaseFiles], status: str, row: Mapping[str, Any], why_none: str
 ) -> dict[str, Any]:
     """Badge, verdict and warnings over all cases. row : of overall.csv.     why_none : why there may be no verdict."""
-    doubt = doubt_of(out_dir, {case.name: case.result for case in cases})
-    said, more = headline(row, _simulator(cases), doubt)
-    told = {"verdict": said or why_none, "more": [*more, *filter(None, [not doubt.copied and of_these_alone(row)])]}
-    return told | {"badge": badge(status, status == "ok", row, doubt), "warnings": doubt.warnings}
+    caveats = caveats_of(out_dir, {case.name: case.result for case in cases})
+    said, more = headline(row, _simulator(cases), caveats)
+    told = {"verdict": said or why_none, "more": [*more, *filter(None, [not caveats.copied and of_these_alone(row)])]}
+    return told | {"badge": badge(status, status == "ok", row, caveats), "warnings": caveats.warnings}
 
 
 def _headline(cases: list[CaseFiles], missing: Sequence[str], damaged: Container[str]) -> dict[str, str]:

@@ -14,9 +14,9 @@ from reports.doubts import (
     MOSTLY_LINES,
     OF_THEIR_RUN,
     OFF_THE_SCANS,
-    Doubt,
+    Caveats,
+    caveats_in,
     copied_from_traces,
-    doubt_in,
     doubted,
     twins,
     warnings_in,
@@ -103,18 +103,18 @@ def _said(
     failed = good < alone["frames"]
     why = {"cases missing": missing, "frames failed": failed, "not pooled": mixed, "gate closed": closed}
     status = first_that_holds(why)
-    off_scans = [text for text in doubt_in(folder).warnings if OFF_THE_SCANS in text]
+    off_scans = [text for text in caveats_in(folder).warnings if OFF_THE_SCANS in text]
     in_line = [line for line in lines if MOSTLY_LINES in line]
-    doubt = Doubt("" if missing or failed or mixed else copied, twins(doubted(folder)), [*off_scans, *in_line])
-    said, more = headline(row, alone["simulator"], doubt, defined=False)
-    rival = row.get("strongest_null") if said and not doubt.copied else None
-    lines = [line for line in lines if line not in (doubt.copied, *off_scans)]
+    caveats = Caveats("" if missing or failed or mixed else copied, twins(doubted(folder)), [*off_scans, *in_line])
+    said, more = headline(row, alone["simulator"], caveats, defined=False)
+    rival = row.get("strongest_null") if said and not caveats.copied else None
+    lines = [line for line in lines if line not in (caveats.copied, *off_scans)]
     said = said or mixed or not_reached(folder) or "No frame of it has a result." * (not good)
-    beside = "" if doubt.copied else _without_others(*alone_skill, row)
+    beside = "" if caveats.copied else _without_others(*alone_skill, row)
     more += filter(None, [beside, f"Of the study {missing}." * bool(missing)])
     rest = len(lines) - _MOST_WARNINGS
     return {
-        "badge": badge(status, status == "ok", row, doubt),
+        "badge": badge(status, status == "ok", row, caveats),
         "verdict": said,
         "more": more,
         "rival": str(rival) if pd.notna(rival) else "",

@@ -7,7 +7,7 @@ from typing import Any
 
 from reports._content import NOTHING, fewer_frames, interval, length, number, predictor_label, value_of
 from reports.case_files import counted
-from reports.doubts import NO_DOUBT, Doubt
+from reports.doubts import NO_CAVEATS, Caveats
 from reports.schema import OURS, SUMMARY
 from reports.tips import tips_off
 
@@ -16,52 +16,52 @@ _WITHHELD = re.compile(r"withheld: (\d+) insertion")
 _FEW = re.compile(r"from (.*) only")  # how the note on an interval over few insertions begins
 
 
-def verdict(statistics: Mapping[str, Any], simulator: str = "", doubt: Doubt = NO_DOUBT) -> str:
+def verdict(statistics: Mapping[str, Any], simulator: str = "", caveats: Caveats = NO_CAVEATS) -> str:
     """How far the simulated wire is from the traced one, and whether that is better than the best guess, in sentences.
 
     statistics : a row of summary.csv or overall.csv.     simulator : whose wire it is, where there are several.
     """
-    return " ".join(text for text, _ in _sentences(statistics, simulator, doubt, defined=True))
+    return " ".join(text for text, _ in _sentences(statistics, simulator, caveats, defined=True))
 
 
 def headline(
-    statistics: Mapping[str, Any], simulator: str = "", doubt: Doubt = NO_DOUBT, *, defined: bool = True
+    statistics: Mapping[str, Any], simulator: str = "", caveats: Caveats = NO_CAVEATS, *, defined: bool = True
 ) -> tuple[str, list[str]]:
     """The ``verdict`` as a page has it: what comes first, and the sentences of the list below.
 
     Ten lines, a whole screen of a telephone, stood before the first number. defined : whether the list says what the
     predictor is, which a page of several simulators says once for all.
     """
-    said = list(_sentences(statistics, simulator, doubt, defined=False))
+    said = list(_sentences(statistics, simulator, caveats, defined=False))
     more, rival = [text for text, first in said if not first], statistics.get("strongest_null")
-    if defined and said and not doubt.copied and number(statistics.get("skill_strongest")) != NOTHING:
+    if defined and said and not caveats.copied and number(statistics.get("skill_strongest")) != NOTHING:
         more.append(f"The predictor {predictor_label(str(rival))!r} is {meaning_of_rival(str(rival))}.")
     return " ".join(text for text, first in said if first), more
 
 
 def _sentences(
-    statistics: Mapping[str, Any], simulator: str, doubt: Doubt, *, defined: bool
+    statistics: Mapping[str, Any], simulator: str, caveats: Caveats, *, defined: bool
 ) -> Iterator[tuple[str, bool]]:
     """The verdict's sentences, each with whether it belongs into the headline."""
-    if doubt.copied:
-        yield f"{doubt.copied}.", True
+    if caveats.copied:
+        yield f"{caveats.copied}.", True
         return
     rms, true = (length(statistics.get(key)) for key in ("rms_mm", "truth_rms_mm"))
     if rms == NOTHING:
         return
     against, few, weaker = _against(statistics, defined=defined)
-    again = f"But {TWINS} that was scanned again, and count as several: see the warnings." * bool(doubt.twins)
+    again = f"But {TWINS} that was scanned again, and count as several: see the warnings." * bool(caveats.twins)
     said = [
         (_far(statistics, simulator, rms), True),
         (f"From the true wire it lies {true} mm." * (true != NOTHING), True),
         (_at_the_floor(statistics), False),
         (_beyond_inputs(statistics), True),
-        (_warned(doubt), True),
+        (_warned(caveats), True),
         (tips_off(statistics), True),
         (against, True),
         (weaker, True),
         (few, False),
-        (_unknown_roll(statistics, simulator, doubt), True),
+        (_unknown_roll(statistics, simulator, caveats), True),
         (again, True),
     ]
     yield from ((text, first) for text, first in said if text)
@@ -79,14 +79,14 @@ def _far(statistics: Mapping[str, Any], simulator: str, rms: str) -> str:
     return sentence + (f"; 95 % of its points lie within {tail} mm." if tail != NOTHING else ".")
 
 
-def _warned(doubt: Doubt) -> str:
+def _warned(caveats: Caveats) -> str:
     """How many warnings stand below, and what the weightiest finds that speaks against an input: with a roll 25 degrees
     off a wire was better than a guess, which was all that the first screen said.
     """
-    if not doubt.against:
-        return f"{counted(len(doubt.warnings), 'warning')} below." * bool(doubt.warnings)
-    others = f"The weightiest of {len(doubt.warnings)} warnings" if len(doubt.warnings) > 1 else "A warning"
-    found = _LISTS.sub("", doubt.against.partition(": check ")[0])
+    if not caveats.against:
+        return f"{counted(len(caveats.warnings), 'warning')} below." * bool(caveats.warnings)
+    others = f"The weightiest of {len(caveats.warnings)} warnings" if len(caveats.warnings) > 1 else "A warning"
+    found = _LISTS.sub("", caveats.against.partition(": check ")[0])
     return f"{others}: {found}."
 
 
@@ -136,17 +136,17 @@ WORSE_BELOW = -0.1
 """Skill without an interval below which a wire is worse than its rival: an rms 5 % above that one's."""
 
 
-def remarks(statistics: Mapping[str, Any], simulator: str = "", doubt: Doubt = NO_DOUBT) -> list[str]:
-    """What rms_mm and skill alone do not show, one sentence each. simulator, doubt : as in :func:`verdict`."""
-    return [text for text in (tips_off(statistics), _unknown_roll(statistics, simulator, doubt)) if text]
+def remarks(statistics: Mapping[str, Any], simulator: str = "", caveats: Caveats = NO_CAVEATS) -> list[str]:
+    """What rms_mm and skill alone do not show, one sentence each. simulator, caveats : as in :func:`verdict`."""
+    return [text for text in (tips_off(statistics), _unknown_roll(statistics, simulator, caveats)) if text]
 
 
-def _unknown_roll(statistics: Mapping[str, Any], simulator: str, doubt: Doubt) -> str:
+def _unknown_roll(statistics: Mapping[str, Any], simulator: str, caveats: Caveats) -> str:
     """That a roll which is stated does worse than none, where the wire is no better than a guess.
 
     Not of traces that lie off the scans: a roll that is fitted to these hides it.
     """
-    if doubt.shows_no_roll:
+    if caveats.shows_no_roll:
         return ""
     rms, unknown = (value_of(statistics.get(key)) for key in ("rms_mm", "null_roll_unknown_rms_mm"))
     if not _skill(statistics)[1] <= 0.0 or not unknown < FAR_BELOW * rms:
@@ -177,21 +177,21 @@ def first_that_holds(words: Mapping[str, Any]) -> str:
     return next((word for word, so in words.items() if so), "ok")
 
 
-def badge(status: str, good: bool, statistics: Mapping[str, Any], doubt: Doubt = NO_DOUBT) -> dict[str, str]:
+def badge(status: str, good: bool, statistics: Mapping[str, Any], caveats: Caveats = NO_CAVEATS) -> dict[str, str]:
     """The word beside a heading, and its look: good, poor (no better than a guess, though nothing failed) or bad.
 
     statistics : a row of summary.csv or overall.csv, empty where nothing was scored. What is ok and has warnings says
     how many, and is poor where one of them speaks against an input; its ``link`` leads to them.
     """
-    if good and doubt.copied:
+    if good and caveats.copied:
         return {"text": COPIED, "look": "bad"}
-    poor = (TWINS if doubt.twins else standing(statistics)) if good else ""
+    poor = (TWINS if caveats.twins else standing(statistics)) if good else ""
     if poor == NOT_SHOWN and _skill(statistics)[1] > 0.0 and _few_insertions(statistics):
         # wires of skill 0.97, 0.44 and 0.07 had one badge, as if none were any good
         poor = f"skill {number(_skill(statistics)[1])}: {TOO_FEW}"
-    if good and not poor and doubt.warnings:
-        text = f"{status}, {counted(len(doubt.warnings), 'warning')}"
-        return {"text": text, "look": "poor" if doubt.against else "good", "link": "#warnings"}
+    if good and not poor and caveats.warnings:
+        text = f"{status}, {counted(len(caveats.warnings), 'warning')}"
+        return {"text": text, "look": "poor" if caveats.against else "good", "link": "#warnings"}
     return {"text": poor or status, "look": "poor" if poor else "good" if good else "bad"}
 
 

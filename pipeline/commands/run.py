@@ -121,13 +121,13 @@ def _sound(plan: "Plan", skip_bad: bool) -> "Plan":
 def _tell(plan: "Plan", totals: "Totals") -> None:
     """What went wrong, on stderr, and what to bear in mind; warnings are not among the result, which -q prints."""
     from pipeline.run.last_words import failure_lines
-    from reports.doubts import doubt_in
+    from reports.doubts import caveats_in
     from reports.verdict import remarks
     from reports.what_next import warned
 
     sys.stderr.writelines(f"{line}\n" for line in (*failure_lines(plan), *(f"FAIL: {why}" for why in totals.closed)))
     aside(warned(plan.out), quiet=plan.template.quiet)
-    for text in remarks(totals.pooled, doubt=doubt_in(plan.out)):
+    for text in remarks(totals.pooled, caveats=caveats_in(plan.out)):
         say(f"warning: {text}")
 
 

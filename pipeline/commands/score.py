@@ -107,7 +107,7 @@ def _judged(plans: "Mapping[str, Plan]", quiet: bool) -> "dict[str, Totals]":
     """Run every simulator's plan, and say what became of it."""
     from pipeline.run.last_words import failure_lines, last_line
     from pipeline.run.launch import launch
-    from reports.doubts import doubt_in
+    from reports.doubts import caveats_in
     from reports.schema import OURS
     from reports.verdict import remarks
 
@@ -121,7 +121,7 @@ def _judged(plans: "Mapping[str, Plan]", quiet: bool) -> "dict[str, Totals]":
         for line in failure_lines(plan, "see to what the messages name, then the same command again"):
             sys.stderr.write(f"{name}: {line}\n")
         say(f"{name}: {last_line(done[name], page)}")
-        for text in remarks(totals.pooled, name, doubt_in(plan.out)):
+        for text in remarks(totals.pooled, name, caveats_in(plan.out)):
             say(f"{name}: warning: {text}")
     return done
 

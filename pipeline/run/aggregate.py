@@ -21,7 +21,7 @@ from pipeline.run.results import Result, Row, found_results, lost, write_json
 from pipeline.status import UsageError
 from reports import tables
 from reports.case_files import GOOD, not_reached, not_run, planned_frames
-from reports.doubts import AMONG, copied_from_traces, doubt_in, doubted, warnings_in
+from reports.doubts import AMONG, caveats_in, copied_from_traces, doubted, warnings_in
 from reports.gates import GATES, asked_of, with_page
 from reports.junit import Outcome, write_junit
 from reports.origin import why_not_pooled
@@ -85,7 +85,7 @@ def aggregate(out: Path, run_info: dict[str, Any] | None = None, name: str = "ru
     whole = overall(among, missing)
     _keep_what_is_seen(out, found, among)
     if whole:
-        whole["warnings"] += len(doubted(out)) + len(remarks(whole, doubt=doubt_in(out)))
+        whole["warnings"] += len(doubted(out)) + len(remarks(whole, caveats=caveats_in(out)))
     rows, (times, replayed_s) = [result.summary for result in found], _times(out, found)
     _write_tables(out, rows, whole, [row for result in (*found, *missing) for row in result.failures])
     tables.write(out / TIMINGS.file, TIMINGS, times)

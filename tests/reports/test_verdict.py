@@ -7,7 +7,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from reports.doubts import MOSTLY_LINES, OFF_THE_SCANS, Doubt, weightiest_first
+from reports.doubts import MOSTLY_LINES, OFF_THE_SCANS, Caveats, weightiest_first
 from reports.unscored import unscored
 from reports.verdict import badge, headline, in_short, of_these_alone, remarks, verdict
 from reports.what_next import next_command, typed, warned, worst_frames
@@ -203,12 +203,12 @@ ROLLED = "turned by -30 degrees, the simulated wire lies 0.10 mm (rms) from the 
 def test_warnings_stand_before_the_word_better(warnings: tuple[str, ...], text: str, look: str, said: str) -> None:
     """A roll 25 degrees off was a green ok and "The wire is better"; that it is wrong stood below the figure."""
     row = {"rms_mm": 0.36, "skill_strongest": 0.8, "strongest_null": "centreline"}
-    doubt = Doubt(warnings=warnings)
-    found = badge("ok", True, row, doubt)
+    caveats = Caveats(warnings=warnings)
+    found = badge("ok", True, row, caveats)
     assert (found["text"], found["look"]) == (text, look)
     assert (found.get("link") == "#warnings") is bool(warnings)
-    assert badge("no_wire", False, row, doubt) == {"text": "no_wire", "look": "bad"}
-    whole = verdict(row, doubt=doubt)
+    assert badge("no_wire", False, row, caveats) == {"text": "no_wire", "look": "bad"}
+    whole = verdict(row, caveats=caveats)
     assert f"{said} The wire is better".strip() in whole
     assert ("arning" in whole) is bool(warnings)
 
@@ -222,16 +222,16 @@ def test_traces_off_the_scans_come_first_and_no_roll_is_advised() -> None:
     """Mirrored own traces, met with a fitted roll, had a green ok; a warning of the roll stood above theirs."""
     off = f"the manifest's {OFF_THE_SCANS} (frame 0: 0.68 mm off): check which curve belongs to which frame"
     row = {"rms_mm": 2.0, "null_roll_unknown_rms_mm": 0.82, "skill_strongest": -1.0, "strongest_null": "roll_unknown"}
-    doubt = Doubt(warnings=weightiest_first(["few points", ROLLED, f"a: {off}"]))
-    assert list(doubt.warnings) == [f"a: {off}", ROLLED, "few points"]
-    said = verdict(row, doubt=doubt)
+    caveats = Caveats(warnings=weightiest_first(["few points", ROLLED, f"a: {off}"]))
+    assert list(caveats.warnings) == [f"a: {off}", ROLLED, "few points"]
+    said = verdict(row, caveats=caveats)
     found = "a: the manifest's own curves are not where the scans show the wire"
     assert f"The weightiest of 3 warnings: {found}. The wire is worse" in said, "what to check is among the warnings"
     assert "With an unknown roll" not in said
-    assert not remarks(row, doubt=doubt)
-    two_points = Doubt(warnings=[f"the wires have few points ({MOSTLY_LINES}): straight lines between them pass"])
+    assert not remarks(row, caveats=caveats)
+    two_points = Caveats(warnings=[f"the wires have few points ({MOSTLY_LINES}): straight lines between them pass"])
     assert not remarks(row, "mine", two_points), "a wire of two points shows no roll, and few points are the cause"
-    good = badge("ok", True, row | {"skill_strongest": 0.9}, Doubt(warnings=[off]))
+    good = badge("ok", True, row | {"skill_strongest": 0.9}, Caveats(warnings=[off]))
     assert (good["text"], good["look"]) == ("ok, 1 warning", "poor")
 
 
@@ -265,7 +265,7 @@ def test_a_page_begins_with_three_sentences_and_says_each_definition_once() -> N
 def test_a_page_of_copied_wires_names_no_predictor() -> None:
     """Below a verdict that named none stood what the predictor 'centreline' is."""
     row = {"rms_mm": 0.01, "skill_strongest": 0.99, "strongest_null": "centreline"}
-    assert headline(row, doubt=Doubt(copied="a: made")) == ("a: made.", [])
+    assert headline(row, caveats=Caveats(copied="a: made")) == ("a: made.", [])
 
 
 def test_a_wrong_roll_is_guessed_at() -> None:
