@@ -14,8 +14,9 @@ import numpy as np
 from solver._kernels import closed_form, newton_method
 from solver._kernels.forces import contact_forces, push_force
 from solver._kernels.forks import turned_aside
-from solver._kernels.insertion import accept_or_revert, begin_step, collect, next_target
+from solver._kernels.insertion import accept_or_revert, begin_step, collect
 from solver._kernels.minimise import look_again
+from solver._kernels.pace import next_target
 from solver._kernels.septum import through_wall
 from solver._kernels.spring_back import spring_back
 from solver._kernels.start import extrapolate_start, lay_along

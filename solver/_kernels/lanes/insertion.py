@@ -14,22 +14,14 @@ from solver._kernels.energy import energy_of, load_moved, stiffest
 from solver._kernels.flags import kernel, merged, released
 from solver._kernels.forces import copy_state, forget_forces
 from solver._kernels.forks import back_again, turned_aside
-from solver._kernels.insertion import (
-    accept_or_revert,
-    adapt_step,
-    at_goal,
-    begin_step,
-    collect,
-    extrapolation_factor,
-    next_target,
-    prepare,
-)
+from solver._kernels.insertion import accept_or_revert, begin_step, collect, extrapolation_factor
 from solver._kernels.lanes.block import Block
 from solver._kernels.lanes.decide import ALONE, DONE, IDLE, NEW, READY, RESTED, STOPPED, SWEEP, WAITING
 from solver._kernels.lanes.relax import POOL, Team, do_round, hand_over, take_over
 from solver._kernels.lanes.start import Desk, chosen_start
 from solver._kernels.lanes.vectors import WIDTH, in_lanes
 from solver._kernels.minimise import begin, shape_of
+from solver._kernels.pace import adapt_step, at_goal, next_target, prepare
 from solver._kernels.snaps import may_fork
 from solver._kernels.spring_back import rests
 
