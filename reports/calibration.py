@@ -28,7 +28,7 @@ COLUMNS = (
     Column("value", "-", "where the wires meet the traces best", "text"),
     Column("sd", "-", "one standard deviation: how far the true value may be off; " + OF_FACTORS, "text"),
     Column("used", "-", USED, "text"),
-    Column("seen", "-", "known well enough to be taken", "text"),
+    Column("seen", "-", "known well enough to be taken, or, with a warning, contradicting what is stated", "text"),
     Column("prior", "-", PRIOR, "text"),
     Column("bounds", "-", "values outside are not tried", "text"),
     Column("meaning", "-", "what it is", "text"),

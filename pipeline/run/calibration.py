@@ -160,8 +160,17 @@ def all_unknowns(cases: Sequence[Case]) -> tuple[Unknown, ...]:
 
 
 def calibrate(found: Gathered, config: Config) -> Calibration:
-    """Fit the parameters."""
-    return calibrated(all_unknowns(found.cases), [Evidence(trial) for trial in found.trials], config.solver)
+    """Fit the parameters; CalibrationError where neither what is stated nor what is found can be taken for one.
+
+    At the end of its range it may lie anywhere beyond, and held as stated it would bend the others.
+    """
+    fit = calibrated(all_unknowns(found.cases), [Evidence(trial) for trial in found.trials], config.solver)
+    ends = [e for e in fit.contradicted if e.unknown.at_an_end(e.value)]
+    if ends:
+        todo = "nothing is saved; state it nearer to that, or correct the wire's profile, the lumen or the rolls"
+        each = [(e, f"it runs to the end of its range, {e.unknown.shown(e.value):.3g}") for e in ends]
+        raise CalibrationError([f"{e.unknown.name}: {e.why}; {where}: {todo}" for e, where in each])
+    return fit
 
 
 def depth_offset(found: Gathered, fit: Calibration) -> tuple[float, float]:

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from pipeline.calibrate import segments
+from pipeline.calibrate import estimates, segments
 from pipeline.calibrate.design import predicted, straight_to
 from pipeline.calibrate.estimates import Estimate, _followed, _judged, calibrated
 from pipeline.calibrate.fit import Problem
@@ -27,12 +27,12 @@ from pipeline.calibrate.unknowns import BENDING, FRICTION, REST, ROLL, TAPER, be
 from pipeline.cli import main
 from pipeline.compare.pooled import is_pooled
 from pipeline.model import Clamp, Curve, Lumen, Wall, Wire
-from pipeline.run import calibration_files, inputs
+from pipeline.run import calibration, calibration_files, inputs
 from pipeline.run.cache import Store
 from pipeline.run.calibrated import as_calibrated, data_of
 from pipeline.run.calibrated_wire import wire_rows
-from pipeline.run.calibration import SAME_MM, depth_offset, gathered, over_insertions
-from pipeline.run.calibration_files import estimates_of, flattened, misfit
+from pipeline.run.calibration import SAME_MM, CalibrationError, depth_offset, gathered, over_insertions
+from pipeline.run.calibration_files import contradicted, estimates_of, flattened, misfit
 from pipeline.run.inputs import described, other_file, stated, times_of
 from pipeline.run.log import Log
 from pipeline.run.outputs import error_row, summary_row
@@ -258,6 +258,55 @@ def test_a_straight_wire_is_followed_from_one_roll_however_it_is_stated():
     for straight in (0.0, [(0.0, 0.0), (8.0, 0.0)]):
         one = trial(replace(WIRE, rest_curvature_per_mm=straight), depths=(10.0, 16.0))
         assert len(fitted(all_of(one), [Evidence(one)], SETTINGS).starts) == 1
+
+
+@pytest.mark.parametrize("times", [8.0, 12.0])
+def test_what_the_traces_contradict_does_not_stay_as_stated(monkeypatch, times):
+    """A shaft stated three times too stiff stayed so, "not seen", and bent the rest curvature by 3.2 of its sd."""
+    stiff = replace(WIRE, bending_stiffness_N_mm2=[(0.0, 0.5), (10.0, 0.5), (30.0, 2.0 * times)])
+    one = replace(trial(noise=0.02, depths=DEPTHS[:3]), wire=stiff)
+    monkeypatch.setattr(calibration, "all_unknowns", lambda _: all_of(one))
+    found: Any = SimpleNamespace(cases=(), trials=(one,))
+    if times > 10.0:  # a factor on it is at least 1 in 5
+        with pytest.raises(CalibrationError, match=r"taper: the traces contradict .* end of its range, 0.2: nothing"):
+            calibration.calibrate(found, SimpleNamespace(solver=SETTINGS))  # type: ignore[arg-type]
+        return
+    fit = calibration.calibrate(found, SimpleNamespace(solver=SETTINGS))  # type: ignore[arg-type]
+    by_name = {e.unknown.name: e for e in fit.estimates}
+    assert abs(by_name[TAPER].used - TRUE[TAPER] + np.log(times)) < 2.0 * by_name[TAPER].sd
+    assert by_name[TAPER].seen
+    assert not by_name["wall:0.05"].seen
+    (told,) = contradicted(fit)
+    assert told.startswith("taper: the traces contradict the stated 1: there the objective is higher by 2")
+    assert "known to a factor of 1.4 only" in told
+
+
+def test_what_is_held_as_stated_bends_nothing_that_is_seen(monkeypatch, at_truth):
+    """Each alone may be as stated; a rest curvature that they move by more than 2 sd together was called seen."""
+    one = at_truth.problem.free[1]
+    every = at_truth.problem.free
+    found = [Estimate(u, 0.0, 0.1, 0.0, u is one, "little is known" * (u is not one), ()) for u in every]
+    for change, seen in ((0.19, 1), (0.21, len(found))):
+        last = replace(at_truth, problem=replace(at_truth.problem, free=(), held={one.name: change}))
+        monkeypatch.setattr(estimates, "held_at_prior", lambda *_, last=last: last)
+        taken, fit = estimates._with_the_stated(at_truth, found, no_roll=False)
+        assert sum(e.seen for e in taken) == seen
+        assert fit is (last if seen == 1 else at_truth)
+    assert "as stated it moves rest_curvature by more than 2 standard deviations" in taken[-1].why
+
+
+def test_a_standard_deviation_is_that_of_what_is_used(at_truth):
+    """It was that of the free fit, whose misfit is another: 3.3 % where the used value was 12 % off."""
+    held = {TAPER: 0.0, "wall:0.05": 0.0, FRICTION: 0.4}
+    free = tuple(u for u in at_truth.problem.free if u.name not in held)
+    problem = replace(at_truth.problem, free=free, held=held)
+    at = np.concatenate([[60.0, TRUE[REST]], np.zeros(OWN + len(DEPTHS))])
+    last = Fit(problem, problem.linear(at), ())
+    about = estimates._about(at_truth, last)
+    assert about.scale == pytest.approx(last.linear.scale)
+    assert about.scale > 4.0 * at_truth.linear.scale
+    assert about.covariance[1, 1] > 1.5 * at_truth.linear.covariance[1, 1]
+    assert estimates._about(at_truth, at_truth) is at_truth.linear
 
 
 def test_a_wire_is_told_what_it_is_stated_without():
