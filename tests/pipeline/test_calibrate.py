@@ -824,6 +824,7 @@ def test_a_fitted_roll_costs_the_frame_it_was_fitted_on(study):
     assert [frame.status for frame in known.frames] == ["no_wire", "roll_fitted", "ok"]
     assert [frame.roll_deg for frame in known.frames] == pytest.approx([-45.0] * 3, abs=3.0)
     assert known.frames[1].ok
+    assert f"(standard deviation {known.roll_sd_deg:.1f})" in run.log.assumptions[0]
     row = summary_row(case, known, [error_row(frame) for frame in known.frames])
     assert (row["frames"], row["frames_ok"], row["frames_failed"]) == (2, 1, 1), "what was fitted on is no result"
     assert not is_pooled({"status": known.frames[1].status}, np.ones(3))
