@@ -52,7 +52,10 @@ class Estimate:
 
 @dataclass(frozen=True, eq=False)
 class FrameError:
-    """Root mean square distance of a frame's wire to its trace, across, mm: as stated and as calibrated."""
+    """Root mean square distance of a frame's wire to its trace, across, mm: as stated and as calibrated.
+
+    turned : whether its insertion was turned for itself: "in_both", "as_calibrated" alone, or empty.
+    """
 
     case: str
     frame: int
@@ -60,6 +63,7 @@ class FrameError:
     before_mm: float
     after_mm: float
     weight: float
+    turned: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -227,6 +231,7 @@ def _errors(last: Fit, evidence: Sequence[Evidence]) -> list[FrameError]:
     before = stated.solved(np.zeros(len(stated.prior[0])))
     found: list[FrameError] = []
     for n, one in enumerate(last.problem.evidence):
+        turned = "in_both" if evidence[n].trial.turned else "as_calibrated" * one.trial.turned
         pairs = [(one.trial, p.points(x)[n]) for p, x in ((stated, before.x), (last.problem, last.linear.x))]
         rows = [
             one.rows(wires, pair[1]) for wires, pair in zip(replayed(pairs, last.problem.solver), pairs, strict=True)
@@ -239,5 +244,5 @@ def _errors(last: Fit, evidence: Sequence[Evidence]) -> list[FrameError]:
             ]
             seen = one.trial.seen[i]
             weight = float(last.linear.weights[n][i])
-            found.append(FrameError(one.trial.name, seen.index, seen.curve.length_mm, rms[0], rms[1], weight))
+            found.append(FrameError(one.trial.name, seen.index, seen.curve.length_mm, rms[0], rms[1], weight, turned))
     return found

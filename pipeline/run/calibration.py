@@ -30,6 +30,9 @@ SAME_MM = 0.5
 """Standard deviation between insertions, mm, of the offset of stated depths, where one insertion alone states any."""
 LEAST_FRAMES = 3
 PLANNED = "it has neither frames nor traces to fit to; what such a study would show is predicted with --design"
+OWN_CLAMP = (
+    '{}: entry = "{}" is for runs: its clamp is fitted with the parameters, from its own entry_mm and entry_direction'
+)
 Say = Callable[[str], None]
 
 
@@ -98,6 +101,7 @@ def gathered(cases: Sequence[Case], config: Config, store: Store, say: Say) -> G
             left_out.append(f"{case.id}: left out: {why}; at least {LEAST_FRAMES} are needed")
             continue
         warnings += [f"{case.id}: {copied}; taken once"] * bool(copied)
+        warnings += [OWN_CLAMP.format(case.id, case.entry)] * bool(case.entry)
         warnings += [f"{case.id}: {text}" for one in taken for text in _scanned_twice(case, frames, one)]
         say(f"{case.id}: {len(frames)} of {len(known.frames)} frames are fitted")
         taken.append(_taken(run, known, frames))

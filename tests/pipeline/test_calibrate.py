@@ -90,6 +90,7 @@ def test_parameters_are_found_again_and_the_clamp_with_them():
     # stated 0.064 mm beside where it is held
     assert np.linalg.norm(moved(shifted.given, own[:5]).entry_mm[:2]) < 0.03
     assert all(frame.after_mm < frame.before_mm for frame in fit.frames)
+    assert {frame.turned for frame in fit.frames} == {""}, "its roll is exact"
 
 
 @pytest.mark.parametrize(("stated_deg", "apart"), [pytest.param(0.0, False, marks=pytest.mark.slow), (-12.0, True)])
@@ -106,6 +107,7 @@ def test_rolls_that_are_stated_wrongly_have_no_common_offset(stated_deg, apart):
     assert roll.seen is not apart
     assert ("b wants 12 degrees more than a" in roll.why) is apart
     assert roll.used == (0.0 if apart else pytest.approx(17.0, abs=1.0))
+    assert {frame.turned for frame in found.frames} == {"as_calibrated" if apart else ""}
 
 
 @pytest.mark.parametrize("off_deg", [9.0, pytest.param(20.0, marks=pytest.mark.slow)])
@@ -668,6 +670,15 @@ def test_a_frame_that_two_cases_have_counts_once(study):
     assert [len(trial.seen) for trial in found.trials] == [3, 3]
     told = "b: 1 frame counted already: frame 0 ends where a frame of case 'a' does, to 0.01 mm; taken once"
     assert found.warnings == (told,)
+
+
+def test_a_clamp_of_another_case_that_a_fit_does_not_take_is_told(study):
+    """Parameters were the same with and without it, and nothing said so."""
+    text = (study / "manifest.toml").read_text(encoding="utf-8").replace('id = "a"', 'id = "a"\nentry = "case:b"')
+    (study / "manifest.toml").write_text(text, encoding="utf-8")
+    found = gathered(read_manifest(study / "manifest.toml").cases[:1], Config(), Store(None), lambda _: None)
+    (told,) = found.warnings
+    assert told.startswith('a: entry = "case:b" is for runs: its clamp is fitted with the parameters')
 
 
 def test_a_case_does_not_score_itself_under_another_name(study):
