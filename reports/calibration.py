@@ -1,6 +1,7 @@
 """The pages of a calibration and of a planned one: parameters with what is seen of them, profiles, errors."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -60,7 +61,7 @@ PLANNED = (
     COLUMNS[0],
     Column("sd", "-", "one standard deviation as the planned study would find it; " + OF_FACTORS, "text"),
     Column("enough", "-", "a standard deviation up to which the parameter counts as seen", "text"),
-    COLUMNS[4],
+    replace(COLUMNS[4], meaning="known well enough to be taken"),
     COLUMNS[-1],
 )
 
