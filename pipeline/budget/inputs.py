@@ -62,7 +62,8 @@ class Nominal(NamedTuple):
     """The insertion about which inputs are drawn.
 
     depth_mm, roll_deg : (stops,) of the whole way of the hand.     config : with the friction.     traced : (stops,)
-    which depths are the traces', so that the tip stays where it is seen when the clamp is moved.
+    which depths are the traces', so that the tip stays where it is seen when the clamp is moved.     roll_sd_deg :
+    standard deviation of a fitted roll, None of a stated one.
     """
 
     clamp: Clamp
@@ -70,6 +71,7 @@ class Nominal(NamedTuple):
     roll_deg: Array
     config: SimulateConfig
     traced: NDArray[np.bool_]
+    roll_sd_deg: float | None = None
 
 
 class Member(NamedTuple):
@@ -96,7 +98,7 @@ def sigmas_of(
     noise_mm: float | None = None,
     calibrated: Mapping[str, float] | None = None,
 ) -> Sigmas:
-    """The standard deviations of a case: what is stated, else what a calibration found, else the defaults.
+    """The standard deviations of a case: what is stated, else what a calibration or a fit found, else the defaults.
 
     stated : keys of ``Uncertainty``, and roll_deg.     depth_mm : (stops,) of the depths.     noise_mm : of the
     lumen's surface by the scan's noise.     calibrated : by the same keys; of roll_deg that of the common
@@ -105,8 +107,9 @@ def sigmas_of(
     found = calibrated or {}
     values, said = {}, {}
     for name, default in _defaults(nominal, wire, voxel_mm, noise_mm).items():
-        source = _source(name)
-        values[source], told = _known(stated.get(name), found.get(name), default, both=name == "roll_deg")
+        source, of_roll = _source(name), name == "roll_deg"
+        otherwise = "fitted" if of_roll and nominal.roll_sd_deg is not None else "default"
+        values[source], told = _known(stated.get(name), found.get(name), (default, otherwise), both=of_roll)
         said[source] = f"{values[source]:.3g}{UNITS.get(name, ' (relative)')}, {told}"
     clamp = nominal.clamp
     known = clamp.covariance is not None
@@ -123,7 +126,7 @@ def _defaults(nominal: Nominal, wire: Wire, voxel_mm: float, noise_mm: float | N
     """Standard deviations of what is neither stated nor calibrated, by the keys of ``Uncertainty``, and roll_deg."""
     noise = LUMEN_NOISE_VOXELS * voxel_mm if noise_mm is None else noise_mm
     return {
-        "roll_deg": ROLL_DEG * wire.curved,
+        "roll_deg": (ROLL_DEG if nominal.roll_sd_deg is None else nominal.roll_sd_deg) * wire.curved,
         "lumen_mm": float(np.hypot(LUMEN_VOXELS * voxel_mm, noise)),
         "lumen_bias_mm": LUMEN_BIAS_VOXELS * voxel_mm,
         "rest_curvature": REST_CURVATURE * wire.curved,
@@ -133,9 +136,11 @@ def _defaults(nominal: Nominal, wire: Wire, voxel_mm: float, noise_mm: float | N
     }
 
 
-def _known(stated: float | None, calibrated: float | None, default: float, *, both: bool) -> tuple[float, str]:
+def _known(
+    stated: float | None, calibrated: float | None, otherwise: tuple[float, str], *, both: bool
+) -> tuple[float, str]:
     """The standard deviation of an input, and whence it is. both : what a calibration found adds to the rest."""
-    own, told = (default, "default") if stated is None else (stated, "stated")
+    own, told = otherwise if stated is None else (stated, "stated")
     if calibrated is None or not (both or stated is None):
         return own, told
     return (float(np.hypot(own, calibrated)), f"{told} and calibrated") if both else (calibrated, "calibrated")

@@ -56,6 +56,11 @@ class Trial:
         return self.group, self.roll_free
 
     @property
+    def turned(self) -> bool:
+        """Whether its roll is fitted for itself, beside the offset that is common; of a straight wire none is seen."""
+        return self.wire.curved and (self.roll_free or self.roll_sigma_deg > 0.0)
+
+    @property
     def sigmas(self) -> Array:
         """Prior standard deviations (OWN + frames,) of what belongs to this insertion alone; 0 is exact."""
         tips = np.hypot([np.nan_to_num(f.curve.tip_sigma_mm) for f in self.seen], TIP_VOXELS * self.voxel_mm)

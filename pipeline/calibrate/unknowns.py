@@ -46,6 +46,11 @@ class Unknown:
         """A value as the reader sees it: a factor for a logarithm."""
         return float(np.exp(value)) if self.logarithmic else value
 
+    def at_an_end(self, value: float) -> bool:
+        """Whether a value is at the end of its range, beyond which it may lie: nothing lies below a friction of 0."""
+        low = bool(np.isclose(value, self.low)) and (self.logarithmic or self.low < 0.0)
+        return low or bool(np.isclose(value, self.high))
+
 
 def spread_in_words(sd: float, *, logarithmic: bool) -> str:
     """A standard deviation to two digits, no exponent; of a factor's logarithm in per cent, or as a factor itself.

@@ -70,7 +70,8 @@ def _fit(args: argparse.Namespace, cases: "tuple[Case, ...]", config: "Config", 
         sd = spread_in_words(one.sd, logarithmic=one.logarithmic)
         fitted, used = (to_its_digits(vars(one), key) for key in ("value", "used"))
         unseen = f"  not seen in these traces, stays as stated; the fit alone gave {fitted}: {one.why}"
-        verdict = f"  ({fitted} where all parameters are free)" * (fitted != used) if one.seen else unseen
+        against = f"  {one.why}" if one.why else f"  ({fitted} where all parameters are free)" * (fitted != used)
+        verdict = against if one.seen else unseen
         say(f"{one.name:20s} {used if one.seen else f'{one.used:g}':>10s}  +- {sd:8s}{verdict}")
     if said := gained([vars(frame) for frame in fit.frames]):
         say(said)

@@ -131,6 +131,13 @@ def _tell(plan: "Plan", totals: "Totals") -> None:
         say(f"warning: {text}")
 
 
+def _without_budget(cases: "Sequence[Case]") -> list[str]:
+    """A line for each case that has no budget though one is asked for."""
+    from pipeline.run.stages.budget import no_budget
+
+    return [f"case {case.id!r}: {why}" for case in cases if (why := no_budget(case))]
+
+
 def _plan(args: argparse.Namespace) -> "Plan":
     """What the command line asks for; raises where it cannot be carried out."""
     from pipeline.run.cache import default_root
@@ -153,6 +160,7 @@ def _plan(args: argparse.Namespace) -> "Plan":
     points = tuple(points_of(args.sweep, settings_of(args)))
     manifest, cases, notes = _to_score(args, manifest)
     notes = (*(f"assumed: {text}" for text in assumed_in(cases)), *notes)
+    notes += tuple(_without_budget(cases)) if settings.config.budget.members else ()
     for note in () if args.quiet else notes:
         say(note)
     if cases:  # else nothing is written

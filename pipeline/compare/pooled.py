@@ -48,8 +48,11 @@ def skill_of(rms_mm: float, null_mm: float) -> float:
     return 1.0 - (rms_mm / null_mm) ** 2 if null_mm > 0 else float("nan")
 
 
-def pooled(frames: Sequence[Scored]) -> dict[str, Any]:
-    """Values of summary.csv over frames that count; empty where there are none."""
+def pooled(frames: Sequence[Scored], judged: Sequence[Scored] | None = None) -> dict[str, Any]:
+    """Values of summary.csv over frames that count; empty where there are none.
+
+    judged : those of them that skill_strongest is over; None is all.
+    """
     if not frames:
         return {}
     points = np.array([len(frame.error_mm) for frame in frames], dtype=float)
@@ -68,7 +71,7 @@ def pooled(frames: Sequence[Scored]) -> dict[str, Any]:
     # by Pythagoras: one offset common to all frames is taken off, the part of the error along the wire that it explains
     left = result["arc_rms_mm"] ** 2 - result["depth_offset_mm"] ** 2
     result["arc_offset_rms_mm"] = float(np.sqrt(max(left, 0.0))) if np.isfinite(left) else float("nan")
-    return result | _releases(frames) | _with_intervals(frames, points, result)
+    return result | _releases(frames) | _with_intervals(frames, frames if judged is None else judged, result)
 
 
 def _releases(frames: Sequence[Scored]) -> dict[str, Any]:
@@ -122,11 +125,12 @@ def by_insertion(frames: Sequence[Scored], *values: Array) -> list[Array]:
     return [np.array([float(of[rows].sum()) for rows in chosen]) for of in values]
 
 
-def _with_intervals(frames: Sequence[Scored], points: Array, values: Row) -> dict[str, Any]:
+def _with_intervals(frames: Sequence[Scored], judged: Sequence[Scored], values: Row) -> dict[str, Any]:
     """The intervals of two statistics (rms, median tip), skill with its own, and what these rest on.
 
     values : of the statistics.
     """
+    points = np.array([len(frame.error_mm) for frame in frames], dtype=float)
     squares, nulls = squares_of(frames), points * numbers(frames, "null_centreline_rms_mm") ** 2
     names = list(dict.fromkeys(frame.insertion for frame in frames))
     parts = [[frame for frame in frames if frame.insertion == name] for name in names]
@@ -144,7 +148,7 @@ def _with_intervals(frames: Sequence[Scored], points: Array, values: Row) -> dic
     }
     if own_skill := skill(frames, squares, nulls):
         found |= own_skill | {"skill_frames": int(np.isfinite(nulls).sum())}
-    best, said = strongest(frames, squares, points)
+    best, said = strongest(judged) if judged else ({}, "")
     own = intervals.note(len(names))
     row, told = intervals.fields(found | best, own if said in ("", own) else f"{own}; {SKILL_STRONGEST} {said}")
     return row | {"interval": told}
@@ -207,13 +211,14 @@ LEAST_SHARE = 0.5
 together: the first frame has no previous one, and no path leads to some tips."""
 
 
-def strongest(frames: Sequence[Scored], squares: Array, points: Array) -> tuple[dict[str, Any], str]:
+def strongest(frames: Sequence[Scored]) -> tuple[dict[str, Any], str]:
     """Skill against the strongest predictor, its name, and a note on the interval.
 
     The strongest is the one with the least error among those that are told nothing of the frame. All predictors are
     judged on the same frames, of which ``strongest_frames`` is the number: one that has no guess for the hardest frame
     would look strong for that reason alone.
     """
+    points = np.array([len(frame.error_mm) for frame in frames], dtype=float)
     result: dict[str, Any] = {"frame_spacing_mm": frame_spacing(frames)}
     nulls = {name: points * numbers(frames, f"null_{name}_rms_mm") ** 2 for name in rivals()}
     if ANOTHER in nulls and np.isfinite(nulls[ANOTHER]).any():
@@ -223,7 +228,7 @@ def strongest(frames: Sequence[Scored], squares: Array, points: Array) -> tuple[
     if not names:
         return result, ""
     best = min(names, key=lambda name: float(nulls[name][common].sum()))
-    found = skill(frames, squares, np.where(common, nulls[best], np.nan), best)
+    found = skill(frames, squares_of(frames), np.where(common, nulls[best], np.nan), best)
     if not found:
         return result, ""
     kept = [frame for frame, is_common in zip(frames, common, strict=True) if is_common]

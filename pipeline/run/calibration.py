@@ -30,6 +30,9 @@ SAME_MM = 0.5
 """Standard deviation between insertions, mm, of the offset of stated depths, where one insertion alone states any."""
 LEAST_FRAMES = 3
 PLANNED = "it has neither frames nor traces to fit to; what such a study would show is predicted with --design"
+OWN_CLAMP = (
+    '{}: entry = "{}" is for runs: its clamp is fitted with the parameters, from its own entry_mm and entry_direction'
+)
 Say = Callable[[str], None]
 
 
@@ -98,6 +101,7 @@ def gathered(cases: Sequence[Case], config: Config, store: Store, say: Say) -> G
             left_out.append(f"{case.id}: left out: {why}; at least {LEAST_FRAMES} are needed")
             continue
         warnings += [f"{case.id}: {copied}; taken once"] * bool(copied)
+        warnings += [OWN_CLAMP.format(case.id, case.entry)] * bool(case.entry)
         warnings += [f"{case.id}: {text}" for one in taken for text in _scanned_twice(case, frames, one)]
         say(f"{case.id}: {len(frames)} of {len(known.frames)} frames are fitted")
         taken.append(_taken(run, known, frames))
@@ -160,8 +164,17 @@ def all_unknowns(cases: Sequence[Case]) -> tuple[Unknown, ...]:
 
 
 def calibrate(found: Gathered, config: Config) -> Calibration:
-    """Fit the parameters."""
-    return calibrated(all_unknowns(found.cases), [Evidence(trial) for trial in found.trials], config.solver)
+    """Fit the parameters; CalibrationError where neither what is stated nor what is found can be taken for one.
+
+    At the end of its range it may lie anywhere beyond, and held as stated it would bend the others.
+    """
+    fit = calibrated(all_unknowns(found.cases), [Evidence(trial) for trial in found.trials], config.solver)
+    ends = [e for e in fit.contradicted if e.unknown.at_an_end(e.value)]
+    if ends:
+        todo = "nothing is saved; state it nearer to that, or correct the wire's profile, the lumen or the rolls"
+        each = [(e, f"it runs to the end of its range, {e.unknown.shown(e.value):.3g}") for e in ends]
+        raise CalibrationError([f"{e.unknown.name}: {e.why}; {where}: {todo}" for e, where in each])
+    return fit
 
 
 def depth_offset(found: Gathered, fit: Calibration) -> tuple[float, float]:

@@ -117,9 +117,19 @@ def misfit(fit: Calibration) -> list[str]:
     ]
 
 
+def contradicted(fit: Calibration) -> list[str]:
+    """A warning of each parameter of which the traces tell little, but more than what is stated."""
+    return [
+        f"{e.unknown.name}: {e.why}; {e.unknown.shown(e.used):.3g} is taken with its standard deviation: state it "
+        "nearer to that, and calibrate again"
+        for e in fit.contradicted
+    ]
+
+
 def warnings_of(found: Gathered, fit: Calibration) -> list[str]:
     """What speaks against the parameters or their standard deviations."""
-    return [*misfit(fit), *flattened(found), *filter(None, [fit.segments.doubt]), *found.warnings]
+    doubt = filter(None, [fit.segments.doubt])
+    return [*misfit(fit), *contradicted(fit), *flattened(found), *doubt, *found.warnings]
 
 
 def segments_said(fit: Calibration) -> str:

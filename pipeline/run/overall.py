@@ -175,10 +175,13 @@ def frames_of(found: Sequence[Found]) -> list[Scored]:
 COUNTED = ("frames", "frames_ok", "frames_failed", "frames_fitted", "warnings")
 
 
-def overall(found: Sequence[Found], missing: Sequence[Result] = ()) -> dict[str, Any]:
+def overall(
+    found: Sequence[Found], missing: Sequence[Result] = (), common: Set[tuple[str, int]] | None = None
+) -> dict[str, Any]:
     """The row of all validation cases, with the columns of summary.csv; empty where no frame counts.
 
-    missing : cases without a result, whose frames were planned all the same.
+    missing : cases without a result, whose frames were planned all the same.     common : frames, by case and number,
+    that skill_strongest is over; None is all.
     """
     used = validation(found)
     frames = frames_of(used)
@@ -189,7 +192,8 @@ def overall(found: Sequence[Found], missing: Sequence[Result] = ()) -> dict[str,
     good = all(case.result.ok for case in used) and not any(result.frame_count for result in missing)
     head = {"case": ALL, "role": "validation", "status": "ok" if good else "frames_failed", **counts}
     share = within([frame.row for frame in frames], counts["frames"])
-    return head | pooled(frames) | {"within_1mm": share, "cases": len(used)}
+    judged = frames if common is None else frames_of(on_frames(used, common))
+    return head | pooled(frames, judged) | {"within_1mm": share, "cases": len(used)}
 
 
 SAME_DEPTH_MM = 2.0

@@ -15,7 +15,7 @@ import numpy as np
 from pipeline.compare import intervals
 from pipeline.model import Array
 from pipeline.run.another import with_another
-from pipeline.run.overall import Found, found_cases, frames_in, on_frames, overall, ratio, validation
+from pipeline.run.overall import Found, found_cases, frames_in, overall, ratio, validation
 from pipeline.run.results import found_results
 from reports import tables
 from reports.case_files import listed
@@ -30,7 +30,6 @@ from reports.verdict import COPIED, TIPS_OFF
 
 STEPS_MM = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
 MOST_BINS = 12
-OF_SKILL = ("skill_strongest", "skill_strongest_low", "skill_strongest_high", "strongest_null", "strongest_frames")
 RATIOS = ("rms_ratio", "rms_ratio_low", "rms_ratio_high", "back_ratio", "back_ratio_low", "back_ratio_high")
 FEW = 0.5
 """Share of the frames of the simulator that has most below which one's few frames are not asked of all."""
@@ -146,9 +145,7 @@ def _alone(name: str, found: Sequence[Found], common: Frames, judged: bool) -> d
     """
     used = validation(found)
     planned = {"frames": sum(case.result.frame_count for case in used), "frames_ok": 0, "within_1mm": 0.0}
-    own, skill = overall(found), overall(on_frames(used, common))
-    beside = {key: skill.get(key) if own and judged else None for key in OF_SKILL}
-    row = planned | own | beside | {"common_frames": len(common)}
+    row = planned | overall(found, common=common if judged else frozenset()) | {"common_frames": len(common)}
     return {key: value for key, value in row.items() if key in SIMULATORS.names} | {"simulator": name}
 
 

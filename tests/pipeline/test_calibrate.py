@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from pipeline.calibrate import segments
+from pipeline.calibrate import estimates, segments
 from pipeline.calibrate.design import predicted, straight_to
 from pipeline.calibrate.estimates import Estimate, _followed, _judged, calibrated
 from pipeline.calibrate.fit import Problem
@@ -27,12 +27,12 @@ from pipeline.calibrate.unknowns import BENDING, FRICTION, REST, ROLL, TAPER, be
 from pipeline.cli import main
 from pipeline.compare.pooled import is_pooled
 from pipeline.model import Clamp, Curve, Lumen, Wall, Wire
-from pipeline.run import calibration_files, inputs
+from pipeline.run import calibration, calibration_files, inputs
 from pipeline.run.cache import Store
 from pipeline.run.calibrated import as_calibrated, data_of
 from pipeline.run.calibrated_wire import wire_rows
-from pipeline.run.calibration import SAME_MM, depth_offset, gathered, over_insertions
-from pipeline.run.calibration_files import estimates_of, flattened, misfit
+from pipeline.run.calibration import SAME_MM, CalibrationError, depth_offset, gathered, over_insertions
+from pipeline.run.calibration_files import contradicted, estimates_of, flattened, misfit
 from pipeline.run.inputs import described, other_file, stated, times_of
 from pipeline.run.log import Log
 from pipeline.run.outputs import error_row, summary_row
@@ -90,6 +90,7 @@ def test_parameters_are_found_again_and_the_clamp_with_them():
     # stated 0.064 mm beside where it is held
     assert np.linalg.norm(moved(shifted.given, own[:5]).entry_mm[:2]) < 0.03
     assert all(frame.after_mm < frame.before_mm for frame in fit.frames)
+    assert {frame.turned for frame in fit.frames} == {""}, "its roll is exact"
 
 
 @pytest.mark.parametrize(("stated_deg", "apart"), [pytest.param(0.0, False, marks=pytest.mark.slow), (-12.0, True)])
@@ -106,6 +107,7 @@ def test_rolls_that_are_stated_wrongly_have_no_common_offset(stated_deg, apart):
     assert roll.seen is not apart
     assert ("b wants 12 degrees more than a" in roll.why) is apart
     assert roll.used == (0.0 if apart else pytest.approx(17.0, abs=1.0))
+    assert {frame.turned for frame in found.frames} == {"as_calibrated" if apart else ""}
 
 
 @pytest.mark.parametrize("off_deg", [9.0, pytest.param(20.0, marks=pytest.mark.slow)])
@@ -258,6 +260,55 @@ def test_a_straight_wire_is_followed_from_one_roll_however_it_is_stated():
     for straight in (0.0, [(0.0, 0.0), (8.0, 0.0)]):
         one = trial(replace(WIRE, rest_curvature_per_mm=straight), depths=(10.0, 16.0))
         assert len(fitted(all_of(one), [Evidence(one)], SETTINGS).starts) == 1
+
+
+@pytest.mark.parametrize("times", [8.0, 12.0])
+def test_what_the_traces_contradict_does_not_stay_as_stated(monkeypatch, times):
+    """A shaft stated three times too stiff stayed so, "not seen", and bent the rest curvature by 3.2 of its sd."""
+    stiff = replace(WIRE, bending_stiffness_N_mm2=[(0.0, 0.5), (10.0, 0.5), (30.0, 2.0 * times)])
+    one = replace(trial(noise=0.02, depths=DEPTHS[:3]), wire=stiff)
+    monkeypatch.setattr(calibration, "all_unknowns", lambda _: all_of(one))
+    found: Any = SimpleNamespace(cases=(), trials=(one,))
+    if times > 10.0:  # a factor on it is at least 1 in 5
+        with pytest.raises(CalibrationError, match=r"taper: the traces contradict .* end of its range, 0.2: nothing"):
+            calibration.calibrate(found, SimpleNamespace(solver=SETTINGS))  # type: ignore[arg-type]
+        return
+    fit = calibration.calibrate(found, SimpleNamespace(solver=SETTINGS))  # type: ignore[arg-type]
+    by_name = {e.unknown.name: e for e in fit.estimates}
+    assert abs(by_name[TAPER].used - TRUE[TAPER] + np.log(times)) < 2.0 * by_name[TAPER].sd
+    assert by_name[TAPER].seen
+    assert not by_name["wall:0.05"].seen
+    (told,) = contradicted(fit)
+    assert told.startswith("taper: the traces contradict the stated 1: there the objective is higher by 2")
+    assert "known to a factor of 1.4 only" in told
+
+
+def test_what_is_held_as_stated_bends_nothing_that_is_seen(monkeypatch, at_truth):
+    """Each alone may be as stated; a rest curvature that they move by more than 2 sd together was called seen."""
+    one = at_truth.problem.free[1]
+    every = at_truth.problem.free
+    found = [Estimate(u, 0.0, 0.1, 0.0, u is one, "little is known" * (u is not one), ()) for u in every]
+    for change, seen in ((0.19, 1), (0.21, len(found))):
+        last = replace(at_truth, problem=replace(at_truth.problem, free=(), held={one.name: change}))
+        monkeypatch.setattr(estimates, "held_at_prior", lambda *_, last=last: last)
+        taken, fit = estimates._with_the_stated(at_truth, found, no_roll=False)
+        assert sum(e.seen for e in taken) == seen
+        assert fit is (last if seen == 1 else at_truth)
+    assert "as stated it moves rest_curvature by more than 2 standard deviations" in taken[-1].why
+
+
+def test_a_standard_deviation_is_that_of_what_is_used(at_truth):
+    """It was that of the free fit, whose misfit is another: 3.3 % where the used value was 12 % off."""
+    held = {TAPER: 0.0, "wall:0.05": 0.0, FRICTION: 0.4}
+    free = tuple(u for u in at_truth.problem.free if u.name not in held)
+    problem = replace(at_truth.problem, free=free, held=held)
+    at = np.concatenate([[60.0, TRUE[REST]], np.zeros(OWN + len(DEPTHS))])
+    last = Fit(problem, problem.linear(at), ())
+    about = estimates._about(at_truth, last)
+    assert about.scale == pytest.approx(last.linear.scale)
+    assert about.scale > 4.0 * at_truth.linear.scale
+    assert about.covariance[1, 1] > 1.5 * at_truth.linear.covariance[1, 1]
+    assert estimates._about(at_truth, at_truth) is at_truth.linear
 
 
 def test_a_wire_is_told_what_it_is_stated_without():
@@ -621,6 +672,15 @@ def test_a_frame_that_two_cases_have_counts_once(study):
     assert found.warnings == (told,)
 
 
+def test_a_clamp_of_another_case_that_a_fit_does_not_take_is_told(study):
+    """Parameters were the same with and without it, and nothing said so."""
+    text = (study / "manifest.toml").read_text(encoding="utf-8").replace('id = "a"', 'id = "a"\nentry = "case:b"')
+    (study / "manifest.toml").write_text(text, encoding="utf-8")
+    found = gathered(read_manifest(study / "manifest.toml").cases[:1], Config(), Store(None), lambda _: None)
+    (told,) = found.warnings
+    assert told.startswith('a: entry = "case:b" is for runs: its clamp is fitted with the parameters')
+
+
 def test_a_case_does_not_score_itself_under_another_name(study):
     text = (study / "manifest.toml").read_text(encoding="utf-8")
     renamed = text.replace('id = "a"\nrole = "calibration"', 'id = "innocent"')
@@ -775,6 +835,7 @@ def test_a_fitted_roll_costs_the_frame_it_was_fitted_on(study):
     assert [frame.status for frame in known.frames] == ["no_wire", "roll_fitted", "ok"]
     assert [frame.roll_deg for frame in known.frames] == pytest.approx([-45.0] * 3, abs=3.0)
     assert known.frames[1].ok
+    assert f"(standard deviation {known.roll_sd_deg:.1f})" in run.log.assumptions[0]
     row = summary_row(case, known, [error_row(frame) for frame in known.frames])
     assert (row["frames"], row["frames_ok"], row["frames_failed"]) == (2, 1, 1), "what was fitted on is no result"
     assert not is_pooled({"status": known.frames[1].status}, np.ones(3))

@@ -22,7 +22,7 @@ from pipeline.simulate.clamp import Prior, TracedFrame, depth_from, estimated_cl
 from pipeline.simulate.clamp_told import left_out
 from pipeline.simulate.evidence import TraceSamples, posterior, roughness_mm, sigma_across
 from pipeline.simulate.way import Stop, Way
-from pipeline.status import FrameStatus
+from pipeline.status import FrameStatus, StageError
 from solver import GuideWire, Insertion, Solution
 from solver.relax import base_frame
 
@@ -251,6 +251,31 @@ def test_frames_that_show_no_wire_fit_no_clamp() -> None:
     refused = noise.doubted(FrameStatus.TRACE_LOW_CONTRAST, "30 mm of line, 0.7 noises bright")
     traced = [frame.traced_by(curve) for frame, curve in zip(frames, (right, refused), strict=True)]
     assert [frame.index for frame in seen_in(traced)] == [0]
+
+
+@pytest.mark.parametrize(("sigma_mm", "seen"), [(0.1, False), (0.1, True), (0.0, False)])
+def test_a_case_that_shows_no_clamp_lends_none(monkeypatch: pytest.MonkeyPatch, sigma_mm: float, seen: bool) -> None:
+    """Its manifest's entry was taken for what its scans show: 0.34 mm rms for 0.06, all frames ok without a word."""
+    monkeypatch.setattr("pipeline.run.stages.clamp._replayed", lambda _run, _known, *args, **_: replay(*args))
+    curves = [trace(12.0 + 4 * i, 0.02, np.random.default_rng(i)) for i in range(3)] if seen else []
+    run, lender = known_of(curves)
+    run.case.entry_sigma_mm = sigma_mm
+    for step in ("open_case", "segment_vessel", "trace_frames", "with_fitted_roll"):
+        monkeypatch.setattr(f"pipeline.run.stages.clamp.{step}", lambda *_: lender)
+    monkeypatch.setattr("pipeline.run.stages.clamp.data_of", lambda case: (case.id,))
+    for frame in lender.frames:
+        frame.voxels = ""
+    run.config, run.store = SimpleNamespace(simulate=SimpleNamespace(entry="traced")), None
+    other = SimpleNamespace(**{**vars(run.case), "id": "lender", "group": "lender"})
+    run.case = SimpleNamespace(**{**vars(run.case), "id": "own", "group": "own", "entry_case": other})
+    if sigma_mm and not seen:
+        with pytest.raises(StageError, match="case 'own': entry = \"case:lender\", but no frame of that case shows"):
+            clamp_of(run, known_of([])[1])
+        return
+    clamp_of(run, known_of([])[1])
+    (said,) = run.log.assumptions
+    told = "the clamp was estimated from frames 0, 1, 2" if seen else "its manifest states it exactly"
+    assert f"it is that of case 'lender': {told}" in said
 
 
 def test_depth_is_counted_from_the_clamp() -> None:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pipeline.cli import main
 from pipeline.run.aggregate import aggregate
 from pipeline.run.overall import found_cases, overall, ratio
-from pipeline.run.simulators import OF_SKILL, Piece, _alike, _as_far, _rows, side_by_side, write_comparison
+from pipeline.run.simulators import Piece, _alike, _as_far, _rows, side_by_side, write_comparison
 from pipeline.run.stages import others
 from pipeline.run.stages.known import Known
 from reports import tables
@@ -58,7 +58,8 @@ def write_tree(out: Path, law: Law, failed: tuple[tuple[int, int], ...] = (), ti
             if not bad:
                 parts.append(pd.DataFrame({"frame": f, "arc_mm": arc, "error_mm": error}))
         tables.write(folder / ERRORS.file, ERRORS, rows)
-        tables.write(folder / POINTS.file, POINTS, pd.concat(parts))
+        if parts:
+            tables.write(folder / POINTS.file, POINTS, pd.concat(parts))
         good = sum(row["status"] == "ok" for row in rows)
         status = "ok" if good == len(rows) else "curve_missing"
         summary = {"case": f"c{c}", "frames": len(rows), "frames_ok": good, "frames_failed": len(rows) - good}
@@ -107,6 +108,19 @@ def test_every_pair_on_the_frames_that_count_in_both(compared: Path) -> None:
     assert list(alone["frames"]) == [24, 24, 24], "planned ones, whatever failed"
     assert alone.loc["worse", "frames_ok"] == 21
     assert alone.loc["worse", "within_1mm"] == pytest.approx(21 / 24)
+
+
+def test_each_row_says_which_interval_rests_on_fewer_insertions(tmp_path: Path) -> None:
+    """Ends of skill were missing beside "wide: 3 insertions", and one row in five said why."""
+    studies = {"wireval": write_tree(tmp_path / "wireval", even(0.2))}
+    studies["a"] = write_tree(tmp_path / "a", even(0.4), failed=tuple((c, f) for c in range(3) for f in range(4)))
+    write_comparison(tmp_path, studies)
+    alone = pd.read_csv(tmp_path / "simulators.csv").query("against.isna()").set_index("simulator")
+    assert alone["interval"].to_dict() == {
+        "wireval": "over 6 insertions; skill_strongest wide: 3 insertions",
+        "a": "wide: 3 insertions",
+    }
+    assert list(alone["strongest_frames"]) == [12, 12]
 
 
 def test_who_is_nearer_is_said_for_the_best_and_every_other_one(compared: Path) -> None:
@@ -431,8 +445,8 @@ def test_the_page_says_how_good_each_is_and_what_was_warned_of(compared: Path) -
     """`score` writes the first simulator beside the page; a warning that our wires get, too, is none of another's."""
     skills = {"tip": 0.5, "worse": 0.4, "wireval": -1.0}
     rows = tables.read(compared / "simulators.csv", SIMULATORS)
-    of_skill = {name: np.nan for name in OF_SKILL if name.endswith(("_low", "_high"))}
-    rows = rows.assign(skill_strongest=rows["simulator"].map(skills), strongest_null="previous", **of_skill)
+    ends = dict.fromkeys(("skill_strongest_low", "skill_strongest_high"), np.nan)
+    rows = rows.assign(skill_strongest=rows["simulator"].map(skills), strongest_null="previous", **ends)
     tables.write(compared / "simulators.csv", SIMULATORS, rows.to_dict("records"))
     for name in skills:
         (compared / "simulators").mkdir(exist_ok=True)

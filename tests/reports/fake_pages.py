@@ -67,7 +67,8 @@ def _calibration(folder: Path) -> Path:
     told |= {"prior": 1.0, "bounds": [0.01, 100.0], "logarithmic": True}
     estimates = [{"name": n, "value": 1.1, "sd": s, "seen": s < 1, **told} for n, s in (("taper", 0.1), ("wall", 1.5))]
     profile = [[0.5, 8.0], [0.9, 2.0], [1.4, 2.0], [4.0, 9.0]]
-    frames = [{"case": "a", "frame": n, "before_mm": 0.2, "after_mm": 0.1, "weight": 1.0} for n in range(4)]
+    frame = {"case": "a", "before_mm": 0.2, "after_mm": 0.1, "weight": 1.0, "turned": "in_both"}
+    frames = [{"depth_mm": 10.0, "frame": n, **frame} for n in range(4)]
     record = {
         "estimates": estimates,
         "correlation": {"names": ["taper", "wall"], "values": np.eye(2).tolist()},

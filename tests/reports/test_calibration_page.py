@@ -31,3 +31,6 @@ def test_variances_are_only_compared_with_those_that_are_stated(
     text = render_calibration(folder).read_text(encoding="utf-8")
     assert said in text
     assert unsaid not in text
+    assert "mm as calibrated, each insertion turned for itself in both" in text
+    assert "clamps fitted to both, each insertion turned for itself in both: a run as stated turns none" in text
+    assert "turned for itself as calibrated" not in text

@@ -151,6 +151,8 @@ def test_a_calibration_that_gains_nothing_says_so() -> None:
     assert said.endswith("0.0901 mm as calibrated: no nearer")
     assert gained([row | {"after_mm": 0.3} for row in frames]).endswith("0.300 mm as calibrated: farther away")
     assert gained([row | {"after_mm": 0.02} for row in frames]).endswith("0.0200 mm as calibrated")
+    for where, words in (("in_both", ", each insertion turned for itself in both"), ("as_calibrated", " with each")):
+        assert f"0.0901 mm as calibrated{words}" in gained([row | {"turned": where} for row in frames])
     assert gained([]) == gained([{"depth_mm": 10.0, "before_mm": None, "after_mm": 0.1}]) == ""
 
 

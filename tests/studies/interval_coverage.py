@@ -23,6 +23,10 @@ SPREAD, OUTLIERS, LARGER, NULL, SHARED = 0.8, 0.05, 16.0, 10.0, 0.6
 SIMULATOR = 0.4
 WRONG, WRONG_BY = 0.2, 100.0
 """Share of insertions that lie in a wrong branch all along, and their mean square over the others'."""
+APART, OWN = 0.5, 0.3
+"""Standard deviations of the logarithm of insertions' mean squares: common to two runs, and of each run's own."""
+RARELY, TWO_RUNS = (0.0, 0.1), (3, 4, 6, 8, 10, 15, 20, 40)
+"""Shares of insertions that a run has in a wrong branch, and numbers of insertions."""
 PARTNERS = (3, 4, 6, 20)
 FEW = (3, 6, 12)
 FRAMES, FEWER, MORE = 30, 10, 50
@@ -120,6 +124,21 @@ def coverage_with_failures(insertions: int, repetitions: int) -> float:
     return held / repetitions
 
 
+def false_verdicts(insertions: int, share: float, repetitions: int) -> float:
+    """Share of repetitions in which the interval of the ratio calls one of two runs better that are equally good.
+
+    Both have the insertions in common, and each errors of its own; it lies in a wrong branch in a ``share`` of them.
+    """
+    draw, found = np.random.default_rng([SEED, insertions, round(1e3 * share)]), 0
+    for _ in range(repetitions):
+        common = np.exp(APART * draw.normal(size=insertions))
+        wrong = np.where(draw.random((2, insertions)) < share, WRONG_BY, 1.0)
+        one, other = common * np.exp(OWN * draw.normal(size=(2, insertions))) * wrong
+        low, high = of_log_ratio(one, other, np.ones(insertions))
+        found += bool(low > 0.0 or high < 0.0)
+    return found / repetitions
+
+
 def main(repetitions: int = 4000) -> None:
     """Print a line for each condition, and the extremes."""
     print("lag  insertions  between  unequal  outliers   mean square   skill  median tip")
@@ -140,6 +159,10 @@ def main(repetitions: int = 4000) -> None:
     for insertions in FEW:
         share = coverage_with_failures(insertions, repetitions)
         print(f"mean square, one insertion in five in a wrong branch, {insertions} of them: {share:.3f}", flush=True)
+    for wrong, insertions in itertools.product(RARELY, TWO_RUNS):
+        share = false_verdicts(insertions, wrong, repetitions)
+        of = f"{insertions} insertions, {wrong:g} of them in a wrong branch"
+        print(f"ratio of two runs as good, {of}: {share:.3f} are called better", flush=True)
 
 
 if __name__ == "__main__":

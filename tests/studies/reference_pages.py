@@ -60,7 +60,8 @@ KEYS = {
     "first frame, which is then not scored.",
     "push_force_N": "Measured push force, one per frame.",
     "push_force_sigma_N": "Standard deviation of the measured push force.",
-    "roll_sigma_deg": "How well the roll is known. The budget and `calibrate` use it. Default: 5 degrees.",
+    "roll_sigma_deg": "How well the roll is known. The budget and `calibrate` use it. Default: 5 degrees, in "
+    "the budget of a fitted roll what the fit says.",
     "insertion_sigma_mm": "Standard deviation of the depth.",
     "simulated": "Another simulator's wires instead of simulated ones, one file per frame; or "
     '`{files = ..., space = "RAS", unit = "mm"}` where the files do not state them.',

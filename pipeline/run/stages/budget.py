@@ -37,6 +37,7 @@ from pipeline.simulate.clamp import TIP_VOXELS, ahead_of
 from pipeline.simulate.evidence import UNKNOWN_VOXELS, TraceSamples
 from pipeline.simulate.resolution import AGREED_MM, lengths_mm
 from pipeline.simulate.way import Way
+from pipeline.study.manifest import Case
 from reports.case_files import frames_named
 
 AT_REST, RARE = 0.9, 0.05
@@ -44,6 +45,7 @@ NOT_OURS = (
     "no budget: it is drawn by this project's own solver, and says what inputs do to its wires alone; of wires from "
     "elsewhere it would take their errors for uncertainty"
 )
+OF_VIEWS = "no budget: it is drawn along wires that were traced in space, and X-ray projections show none"
 FEW_ALONE = (
     f"budget.members_alone = {{}}: of fewer than {FEWEST} insertions nothing is said, so that the table by source has "
     f"no values; give {FEWEST} or more, or 0 for no such table"
@@ -58,10 +60,9 @@ def budgeted(run: Context, known: Known) -> Known:
     """The case with the uncertainty budget of every frame and by source; unchanged where there can be none."""
     frames = [f for f in known.frames if f.ok and f.solved is not None and len(f.solved.joints_mm) > 1]
     settings = run.config.budget
-    if run.case.projections:
+    if settings.members and (why := no_budget(run.case)):
+        run.log.assumptions.append(why)
         return known
-    if settings.members and any(f.simulated is not None and f.solved is None for f in known.frames):
-        run.log.assumptions.append(NOT_OURS)
     if not settings.members or not frames or known.clamp is None or not np.isfinite(known.segment_mm):
         return known
     with run.log.timed("compare"):
@@ -81,6 +82,11 @@ def budgeted(run: Context, known: Known) -> Known:
     run.log.warnings += [FEW_ALONE.format(settings.members_alone)] * (0 < settings.members_alone < FEWEST)
     done = tuple(replace(frame, budget=found.get(frame.index)) for frame in known.frames)
     return replace(known, frames=done, sources=tuple(rows), ends_rank=rank)
+
+
+def no_budget(case: Case) -> str:
+    """Why a case has no budget though one is asked for; empty where it has."""
+    return OF_VIEWS if case.projections else NOT_OURS if case.simulated is not None else ""
 
 
 def _lost(found: Mapping[int, Budget | None], count: int) -> list[str]:
@@ -142,7 +148,8 @@ class Work:
         stops = [known.frames[stop.frame] for stop in self.way.stops]
         traced = _by_traces(stops, self.numbers, config.simulate.depth)
         depth, roll = np.array(self.way.depths_mm), np.array(self.way.rolls_deg)
-        self.nominal = Nominal(known.held, depth, roll, replace(config.simulate, friction=friction), traced)
+        with_friction = replace(config.simulate, friction=friction)
+        self.nominal = Nominal(known.held, depth, roll, with_friction, traced, known.roll_sd_deg)
         stated = {"roll_deg": case.roll_sigma_deg, **asdict(case.uncertainty)}
         noise = known.vessel.levels.get("wall_noise_mm")
         longest = float(np.max(known.vessel.distance.spacing_mm))

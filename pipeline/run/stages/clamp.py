@@ -22,6 +22,7 @@ from pipeline.simulate.departures import beside, departed
 from pipeline.simulate.evidence import UNKNOWN_VOXELS
 from pipeline.simulate.resolution import lengths_mm
 from pipeline.simulate.way import Stop, Way
+from pipeline.status import FrameStatus, StageError
 from pipeline.study.manifest import Case
 from solver import Solution
 
@@ -55,16 +56,21 @@ def _of_another(run: Context, other: Case, given: Clamp, own: Sequence[Frame]) -
     silent = Context(other, run.config, run.store, Log(lambda *_: None))
     known = with_fitted_roll(silent, trace_frames(silent, segment_vessel(silent, open_case(silent, Known()))))
     clamp = clamp_of(silent, known)
+    exact = "its manifest states it exactly" * (not np.any(clamp.covariance))
+    told = clamp.note or exact or "its manifest's, of which there is a warning" * bool(clamp.warning)
+    if not told:  # what its manifest states is no better known here than what this case's own does
+        why = f'entry = "case:{other.id}", but no frame of that case shows where its wire is held'
+        raise StageError(FrameStatus.SIMULATE_FAILED, f"case {run.case.id!r}: {why}; name another, or take it off")
     mine, others = ({*data_of(case), *(f.voxels for f in of)} for case, of in ((run.case, own), (other, known.frames)))
     shares = "has scans of this case" if mine & others - {""} else ""
     if run.case.group == other.group:
         shares = f"is of the same insertion (group {other.group!r})"
     if shares:
-        told = "the clamp is not blind to it; name a case of another insertion"
-        run.log.warnings.append(f"the clamp is that of case {other.id!r}, which {shares}: {told}")
+        todo = "the clamp is not blind to it; name a case of another insertion"
+        run.log.warnings.append(f"the clamp is that of case {other.id!r}, which {shares}: {todo}")
     else:
         blind = "the clamp is blind to this case's scans, it is that of case"
-        run.log.assumptions.append(f"{blind} {other.id!r}: {clamp.note}")
+        run.log.assumptions.append(f"{blind} {other.id!r}: {told}")
     run.log.warnings += [f"of case {other.id!r}: {clamp.warning}"] * bool(clamp.warning)
     return replace(clamp, material_axis=given.material_axis, down=given.down)
 

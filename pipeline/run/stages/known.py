@@ -143,7 +143,8 @@ class Known:
 
     lumen_doubt : what the scan says against a given lumen that is far off; empty where it is not.
     off_the_scans : whether own traces lie off the wires that the scans show: nothing is then told from the traces.
-    clamp, segment_mm : what was simulated with.     clues : see ``clues_of``.
+    clamp, segment_mm : what was simulated with.     roll_sd_deg : standard deviation of a fitted roll, None of a
+    stated one.     clues : see ``clues_of``.
     sources, entries : rows of budget.csv and entries.csv.
     ends_rank : of the real insertion in the budget's ensemble (see ``budget.joint``).
     failure : why the case went no further.     at_entry : the scan around the entry, where no lumen was found.
@@ -154,6 +155,7 @@ class Known:
     lumen_doubt: str = ""
     off_the_scans: bool = False
     clamp: Clamp | None = None
+    roll_sd_deg: float | None = None
     clues: Clues | None = None
     segment_mm: float = float("nan")
     frames: tuple[Frame, ...] = ()

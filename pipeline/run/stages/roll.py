@@ -42,4 +42,4 @@ def with_fitted_roll(run: Context, known: Known) -> Known:
     status = FrameStatus.ROLL_FITTED
     frames = [replace(frame, roll_deg=frame.roll_deg + found.roll_deg) for frame in known.frames]
     frames[first.index] = replace(frames[first.index], status=status.identifier, sentence=status.value)
-    return replace(known, frames=tuple(frames))
+    return replace(known, frames=tuple(frames), roll_sd_deg=found.sd_deg)
