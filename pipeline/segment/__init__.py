@@ -17,7 +17,7 @@ from pipeline.segment import bone, leaked, thin, uneven, valley
 from pipeline.segment.config import SegmentConfig
 from pipeline.segment.contact import warning
 from pipeline.segment.cut_off import cut_off
-from pipeline.segment.embedded import surrounding
+from pipeline.segment.embedded import Block, surrounding
 from pipeline.segment.ends import ends
 from pipeline.segment.flat_side import flat_side
 from pipeline.segment.fuzzy import fuzzy_region
@@ -49,6 +49,7 @@ class _Found:
 
     least : lowest share of the contrast along the vessel.  blur : the scanner's, mm.  layer : what lies around it.
     tissue : grey of what hung together with it.
+    block : what surrounds it, and could not be parted from it.
     """
 
     grid: Grid
@@ -59,6 +60,7 @@ class _Found:
     blur: float
     layer: Layer | None = None
     tissue: float | None = None
+    block: Block | None = None
 
     @property
     def distance(self) -> Grid:
@@ -67,20 +69,24 @@ class _Found:
 
 
 def _found(grid: Grid, seeds_mm: ArrayLike, config: SegmentConfig, wire: bool) -> _Found:
-    """The vessel; where it lies in a wall or a block of its own, the one that is found with that around it."""
+    """The vessel; where it lies in a wall or a block of its own, the one that is found with that around it.
+
+    Where no vessel is left within that, there was none, and what was found stays; of a block it is told, but not where
+    the seed may lie on a wire, which is such a part.
+    """
     found = _as_shown(grid, seeds_mm, config, wire, METHOD)
-    around = grid, found.distance, found.site.corner
-    seed, noise = found.region.levels.seed, found.region.levels.noise_left
-    layer = layer_around(*around, seed)
+    around, levels = (grid, found.distance, found.site.corner), found.region.levels
+    layer = layer_around(*around, levels.seed)
     if layer is not None:
-        method = partial(METHOD, noise_left=noise)
-        # where no vessel is left within it, it was none
+        method = partial(METHOD, noise_left=levels.noise_left)
         with suppress(StageError):
             return replace(_as_shown(with_layer_alone(layer, *around), seeds_mm, config, wire, method), layer=layer)
-    block = surrounding(*around, seed, found.wall.blur_mm)
-    if block is None:
-        return found
-    return replace(_as_shown(grid, seeds_mm, config, wire, partial(METHOD, outside=block)), tissue=block)
+    block = surrounding(*around, levels, found.wall.blur_mm)
+    if block is not None and block.grey < block.at_seed:
+        method = partial(METHOD, outside=block.grey)
+        with suppress(StageError):
+            return replace(_as_shown(grid, seeds_mm, config, wire, method), tissue=block.grey)
+    return found if wire else replace(found, block=block)
 
 
 def _as_shown(
@@ -126,8 +132,9 @@ def _of_the_vessel(scan: Grid, found: _Found) -> tuple[str, ...]:
     """Sentences on what surrounds it, and fills it."""
     layer = () if found.layer is None else (surrounded(found.layer, float(np.mean(found.grid.spacing_mm))),)
     tissue = leaked.warning(found.tissue, found.region.levels.inside)
+    block = () if found.block is None else (found.block.warning,)
     sides = () if found.wall.sides is None else found.wall.sides.warning()
-    return layer + tissue + sides + cut_off(scan, found.distance, found.site.corner) + flat_side(found.distance)
+    return layer + tissue + block + sides + cut_off(scan, found.distance, found.site.corner) + flat_side(found.distance)
 
 
 def _beside_it(found: _Found) -> tuple[str, ...]:

@@ -5,68 +5,80 @@ said so. Two plateaus below the wall that was found, of which the seed's lies wi
 the other, as bone or medium that has settled, or follows it, as a part that is filled less, reaches that wall.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
-from skimage.filters import threshold_otsu
 from skimage.segmentation import find_boundaries
 
 from pipeline.arrays.grids import spread, unflattened
 from pipeline.segment.bone import DEEP
-from pipeline.segment.groups import ASHMANS_D
-from pipeline.segment.levels import Index, box_from, grey_around
+from pipeline.segment.groups import two_groups
+from pipeline.segment.levels import GreyLevels, Index, box_from, grey_around
 from solver.grid import Grid
 
 LOOKED_AT, LEAST = 20_000, 100
-"""Voxels below the wall that are looked at, and the least of the vessel's that tell anything."""
+"""Voxels below the wall that are looked at, and the least of a part that tell anything."""
+CLEAR = 8.0
+"""Spreads of a block's greys by which the seed is brighter: a vessel that is brightest in its middle reaches 4."""
+GAP = 0.04
+"""Least share of the contrast between the two plateaus: a vessel of hardly any noise has groups of 0.01."""
 FURTHER_VOXELS = 1.0
 """How much deeper than the plateau begins the vessel's own wall must lie, to be none that was found."""
 WITHIN = 0.8
 """Share of that wall: 0.95 and more in a block or a tube, 0.5 where medium has settled."""
 
 
-def surrounding(
-    grid: Grid, distance: Grid, corner: Index, seed: tuple[int, ...] | None, blur_mm: float
-) -> float | None:
-    """The grey of what a segmented vessel holds around the true one, of another plateau than at the seed; or None.
+class Block(NamedTuple):
+    """What lies around the seed's plateau within what was found: its grey, and that at the seed."""
 
-    distance : signed, mm, from the wall that was found, on a box that begins at ``corner`` of the scan.  seed : a voxel
-    whose grey is the vessel's.  blur_mm : the wall's.
+    grey: float
+    at_seed: float
+
+    @property
+    def warning(self) -> str:
+        """The sentence for the report where the two could not be parted."""
+        return (
+            f"segment: grey {self.grey:.0f} surrounds that at the entry, {self.at_seed:.0f}, within what was found: is "
+            "it the wall of a phantom, filled with hardly more than that, or not at all? Then the lumen is too wide; "
+            "fill it, or give the lumen as a file (manifest key lumen)"
+        )
+
+
+def surrounding(grid: Grid, distance: Grid, corner: Index, levels: GreyLevels, blur_mm: float) -> Block | None:
+    """What a segmented vessel holds around the true one; None where it holds the vessel alone.
+
+    distance : signed, mm, from the wall that was found, on a box that begins at ``corner`` of the scan.  levels : of
+    what was found, whose seed has the vessel's grey.  blur_mm : the wall's.
     """
     values, plateau_mm = distance.values, DEEP * blur_mm
     deep = np.flatnonzero(values < -plateau_mm)
-    if seed is None or len(deep) < LEAST:
+    if levels.seed is None or len(deep) < LEAST:
         return None
     index = unflattened(deep[:: max(1, len(deep) // LOOKED_AT)], distance.shape)
-    at_seed = float(grey_around(grid, np.array([seed]))[0])
-    other = _other_plateau(grey_around(grid, index + corner), at_seed)
-    if other is None:
+    grey, at_seed = grey_around(grid, index + corner), float(grey_around(grid, np.array([levels.seed]))[0])
+    bright, low, high, apart = two_groups(grey)
+    if at_seed > 0.5 * (low + high):  # a thin vessel has no plateau of its own
+        high, apart = at_seed, CLEAR * spread(grey[~bright])
+    if not high - low >= max(apart, GAP * levels.contrast):
         return None
+    middle = 0.5 * (low + high)
     mean = ndimage.uniform_filter(np.asarray(grid.values[box_from(corner, distance.shape)], np.float32), 3)
-    middle = 0.5 * (at_seed + other)
     alike = (values < -plateau_mm) & ((mean > middle) == (at_seed > middle))
     wall_mm = -plateau_mm - FURTHER_VOXELS * float(np.min(grid.spacing_mm))
-    return other if _lies_within(alike, values < wall_mm, np.array(seed) - corner) else None
-
-
-def _other_plateau(grey: NDArray[np.float64], at_seed: float) -> float | None:
-    """The median of the greys (n,) on the other side of Otsu's threshold than the seed's, where it is a plateau."""
-    if np.ptp(grey) == 0.0:
+    if not _lies_within(alike, values < wall_mm, np.array(levels.seed) - corner):
         return None
-    middle = threshold_otsu(grey)
-    others = grey[(grey > middle) != (at_seed > middle)]
-    if len(others) < LEAST:
-        return None
-    other = float(np.median(others))
-    return other if abs(at_seed - other) > ASHMANS_D * spread(others) else None
+    return Block(low if at_seed > middle else high, at_seed)
 
 
 def _lies_within(alike: NDArray[np.bool_], deeper: NDArray[np.bool_], seed: NDArray[np.int64]) -> bool:
     """Whether the part that hangs together with a seed ends where it is deep; at the box's faces it goes on."""
-    numbers, _ = ndimage.label(alike)
     if not alike[tuple(seed)]:
         return False
+    numbers, _ = ndimage.label(alike)
     box = ndimage.find_objects(numbers)[numbers[tuple(seed)] - 1]
-    part = np.pad(numbers[box] == numbers[tuple(seed)], 1)
-    wall = find_boundaries(part, mode="inner")[1:-1, 1:-1, 1:-1]
-    return bool(np.count_nonzero(part) >= LEAST and np.mean(deeper[box][wall]) > WITHIN)
+    wider = tuple(slice(max(0, s.start - 1), s.stop + 1) for s in box)
+    part = numbers[wider] == numbers[tuple(seed)]
+    wall = find_boundaries(part, mode="inner")
+    return bool(np.count_nonzero(part) >= LEAST and np.mean(deeper[wider][wall]) > WITHIN)

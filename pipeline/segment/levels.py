@@ -203,9 +203,11 @@ def plateau(scan: Grid, distance: Grid, levels: GreyLevels, blur_mm: float) -> G
     if foreign > BRIGHT_SHARE:
         some = np.arange(0, len(grey), max(1, len(grey) // 20_000))
         some = some[grey_around(scan, unflattened(there[some], scan.shape)) <= limit]
+        levels = replace(levels, brightest=limit, foreign=foreign)
+        if not len(some):
+            return levels
         off_wall, grey = off_wall[some], grey[some]
         depth, core = _deepest(off_wall)
-        levels = replace(levels, brightest=limit, foreign=foreign)
     if depth > THICK * blur_mm:
         return replace(levels, inside=_median(grey[core], levels.inside))
     core = core[:: max(1, len(core) // 500)]
