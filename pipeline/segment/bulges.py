@@ -30,6 +30,8 @@ BALLS = 0.9
 1 would leave out where the vessel is a little wider along the wire."""
 BESIDE = 16
 """Bright voxels next to each other of which one, at least, looks straight at the vessel's middle."""
+LEAST = 5
+"""Bright voxels within REACH_VOXELS of one, itself included, from which it is no noise."""
 NEAREST = 64
 """Balls next to a voxel among which the one is looked for that it is deepest in."""
 
@@ -89,7 +91,7 @@ def _balls(distance: Grid, middle: Array, most: Array) -> tuple[Array, Array]:
     deep = indices_of(distance.values < -BALLS * most.min())
     away, nearest = cKDTree(middle).query(deep * spacing)
     radius = -distance.values[tuple(deep.T)].astype(float)
-    kept = (radius >= BALLS * most[nearest]) & (away < most[nearest] + 3.0 * REACH_VOXELS * np.max(spacing))
+    kept = (radius >= BALLS * most[nearest]) & (away < most[nearest] + 2.0 * REACH_VOXELS * np.max(spacing))
     return deep[kept] * spacing, radius[kept]
 
 
@@ -108,6 +110,7 @@ def _middle(distance: Grid, wire: Index) -> tuple[Array, Array]:
     top = np.argmax(np.where(rising, depth, 0.0), axis=1)
     each = np.arange(len(wire))
     middle, most = way[each, top], depth[each, top]
-    beside = cKDTree(wire * spacing).query(wire * spacing, min(BESIDE, len(wire)))[1].reshape(len(wire), -1)
-    best = beside[each, np.argmax(most[beside], axis=1)]
-    return middle[best], most[best]
+    beside = cKDTree(wire * spacing).query(wire * spacing, BESIDE, distance_upper_bound=REACH_VOXELS * h)[1]
+    best = beside[each, np.argmax(np.append(most, 0.0)[beside], axis=1)]
+    line = np.sum(beside < len(wire), axis=1) >= LEAST
+    return middle[best], np.where(line, most[best], 0.0)
