@@ -110,7 +110,8 @@ def _middle(distance: Grid, wire: Index) -> tuple[Array, Array]:
     top = np.argmax(np.where(rising, depth, 0.0), axis=1)
     each = np.arange(len(wire))
     middle, most = way[each, top], depth[each, top]
-    beside = cKDTree(wire * spacing).query(wire * spacing, BESIDE, distance_upper_bound=REACH_VOXELS * h)[1]
+    found = cKDTree(wire * spacing).query(wire * spacing, BESIDE, distance_upper_bound=REACH_VOXELS * h)
+    beside = np.asarray(found[1])
     best = beside[each, np.argmax(np.append(most, 0.0)[beside], axis=1)]
     line = np.sum(beside < len(wire), axis=1) >= LEAST
     return middle[best], np.where(line, most[best], 0.0)
