@@ -83,9 +83,10 @@ def _found(grid: Grid, seeds_mm: ArrayLike, config: SegmentConfig, wire: bool) -
         with suppress(StageError):
             return replace(_as_shown(with_layer_alone(layer, *around), seeds_mm, config, wire, method), layer=layer)
     block = surrounding(*around, seed, found.wall.blur_mm)
-    if block is None:
-        return found
-    return replace(_as_shown(grid, seeds_mm, config, wire, partial(METHOD, outside=block)), tissue=block)
+    if block is not None:
+        with suppress(StageError):
+            return replace(_as_shown(grid, seeds_mm, config, wire, partial(METHOD, outside=block)), tissue=block)
+    return found
 
 
 def _as_shown(
