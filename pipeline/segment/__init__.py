@@ -83,10 +83,14 @@ def _found(grid: Grid, seeds_mm: ArrayLike, config: SegmentConfig, wire: bool) -
         with suppress(StageError):
             return replace(_as_shown(with_layer_alone(layer, *around), seeds_mm, config, wire, method), layer=layer)
     block = surrounding(*around, seed, found.wall.blur_mm)
-    if block is not None:
-        with suppress(StageError):
-            return replace(_as_shown(grid, seeds_mm, config, wire, partial(METHOD, outside=block)), tissue=block)
-    return found
+    if block is None:
+        return found
+    try:
+        return replace(_as_shown(grid, seeds_mm, config, wire, partial(METHOD, outside=block)), tissue=block)
+    except StageError:
+        if not wire:
+            raise
+        return found  # the medium around a seed on the wire was taken for a block
 
 
 def _as_shown(
