@@ -52,6 +52,7 @@ def beside_the_wall(lumen: Lumen, scan: Volume) -> LumenDoubt:
     layer = layer_in(distance[seen] / voxel, grey)
     if layer is not None:  # what is darker than the phantom's wall tells nothing of the vessel's
         grey = np.maximum(grey, layer.floor)
+    grey = _in_brighter(grey, distance[seen] / voxel)
     found = _offset(grey, normals[seen], distance[seen] / voxel)
     if found is None:
         return LumenDoubt()
@@ -67,6 +68,21 @@ def beside_the_wall(lumen: Lumen, scan: Volume) -> LumenDoubt:
     do = "check its axes (LPS or RAS), registration and unit, whether radii are diameters, and how it was segmented"
     far = bool(max(abs(larger), np.linalg.norm(shift)) >= FAR_VOXELS * voxel)
     return LumenDoubt(f"the given lumen lies {' and '.join(off)}: {do}", far)
+
+
+def _in_brighter(grey: Array, off: Array) -> Array:
+    """Grey (n,) at so many voxels outside a lumen (n,); where it lies in something brighter, as far as if that went on.
+
+    Water in resin in air: from 0 to -1000 is a larger step than from 0 to 300, and was taken for the wall.
+    """
+    deep = grey[off < -CLEAR_VOXELS]
+    beside = [grey[np.abs(off - at) < 0.5] for at in np.arange(0.5, NEAR_VOXELS)]
+    if len(deep) < LEAST_POINTS // 10:
+        return grey
+    inside, around = float(np.median(deep)), max((float(np.median(b)) for b in beside if len(b)), default=-np.inf)
+    if around - inside < LEAST_NOISES * spread(deep):
+        return grey
+    return np.where((off > 0.0) & (grey < inside - 0.5 * (around - inside)), around, grey)
 
 
 def _near(lumen: Lumen, reach_mm: float) -> tuple[Array, Array, Array]:

@@ -28,6 +28,7 @@ from pipeline.trace.bends import bent, hook_error
 from pipeline.trace.config import TraceConfig
 from pipeline.trace.crests import SEED_SIGMAS, STRICT_BEND
 from pipeline.trace.doubts import doubted, no_wire, not_washed_out
+from pipeline.trace.fall import fall_mm
 from pipeline.trace.noise import inflation
 from pipeline.trace.subtraction import Subtraction, levelled
 from pipeline.trace.tube import DIM_END, Tube, point_sigmas
@@ -211,7 +212,7 @@ def _own_tip(image: Subtraction, tube: Tube) -> float:
     """The part of the tip's error that is not due to noise, mm."""
     own = DIM_TIP if tube.steps.levels[-1] < DIM_END else BRIGHT_TIP if len(tube.steps.edges) else PLAIN_TIP
     half_radius = float(np.sqrt(max(0.0, tube.sigma**2 - image.wall_blur_mm**2)))
-    return max(own * image.voxel, BLUNT_TIP * half_radius)
+    return max(own * image.voxel, BLUNT_TIP * half_radius, fall_mm(image, tube))
 
 
 def _curve(image: Subtraction, best: Candidate) -> Curve:

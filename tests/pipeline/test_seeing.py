@@ -95,7 +95,7 @@ def test_a_reference_of_another_phantom_is_named(other: bool):
 
 def test_a_stated_depth_does_not_hide_that_the_direction_is_turned_round():
     """It was a length that disagrees, to be corrected in the manifest."""
-    row = look("entry_direction the wrong way round", 3, expected_mm=30.0)
+    row = look("entry_direction the wrong way round", 0, expected_mm=30.0)
     assert row.status == "TRACE_WRONG_WAY", row.text
     assert "state insertion_mm" not in row.text
 

@@ -61,6 +61,18 @@ def test_a_lumen_of_another_size_is_told_by_how_much(tube: Grid, by_mm: float) -
     assert found == pytest.approx(abs(by_mm), abs=0.15 * VOXEL)
 
 
+@pytest.mark.parametrize(("thick_mm", "by_mm"), [(1.2, 0.0), (1.5, 0.0), (2.5, 0.0), (2.5, 0.8), (2.5, -0.8)])
+def test_water_in_resin_in_air_has_its_wall_where_grey_rises(tube: Grid, thick_mm: float, by_mm: float) -> None:
+    """It falls by more where the resin ends: a right label map was told to lie 0.9 mm inside the wall."""
+    wet, dry = (ndtr((tube.values - at) / (0.8 * VOXEL)) for at in (0.0, thick_mm))
+    grey = 300.0 * wet - 1300.0 * dry + 60.0 * np.random.default_rng(5).normal(size=tube.shape)
+    told, _ = beside_the_wall(larger(tube, by_mm), Volume(grey, tube.spacing_mm, tube.origin_mm, tube.direction))
+    assert bool(told) is (by_mm != 0.0)
+    if told:
+        assert ("outside the wall" if by_mm > 0 else "inside the wall") in told
+        assert float(told.partition("lies ")[2].partition(" mm")[0]) == pytest.approx(abs(by_mm), abs=0.15 * VOXEL)
+
+
 def test_a_lumen_elsewhere_is_told_where(tube: Grid) -> None:
     lumen = Lumen(replace(tube, origin_mm=tube.origin_mm + [0.0, 0.6, -0.3]))
     told, _ = beside_the_wall(lumen, scan_of(tube))

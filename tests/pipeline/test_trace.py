@@ -201,7 +201,7 @@ def test_without_a_reference_uneven_contrast_neither_moves_the_tip_nor_goes_unst
     spread = {}
     for name, clean in (("even", wired), ("fading", faded + wired - empty)):
         frame = Volume(np.asfortranarray(phantoms.scan(clean, 0.8, PEAK / 16, 5)), [VOXEL] * 3, origin)
-        curve = trace(frame, segment(frame, entry[None]), entry, direction)
+        curve = trace(frame, segment(frame, entry[None], wire_radius_mm=0.2), entry, direction)
         assert curve.status is FrameStatus.OK
         assert point_to_curve(curve.points_mm, wire)[0].mean() < 0.06 * VOXEL
         assert np.linalg.norm(curve.points_mm[-1] - wire[-1]) < 0.35 * VOXEL

@@ -34,7 +34,7 @@ def too_thin(frames: Sequence[Frame], lumen: Lumen, radius_mm: float) -> list[st
     blurs = [curve.levels["blur_mm"] for curve in trusted(frames).values() if "blur_mm" in curve.levels]
     if not blurs or 2.0 * radius_mm < LEAST_VOXELS * float(np.max(lumen.distance.spacing_mm)):
         return []
-    seen = _seen_radius_mm(float(np.median(blurs)), lumen)
+    seen = _seen_radius_mm(float(np.median(blurs)), lumen, unsure=lumen.levels.get("blur_unsure", 0.0))
     if not 0.0 < seen < LEAST_SHARE * radius_mm:  # no line is sharper than the scanner: its blur is misjudged
         return []
     if seen < DIAMETER_SHARE * radius_mm:
@@ -65,14 +65,16 @@ def not_too_thick(curve: Curve, lumen: Lumen, radius_mm: float) -> Curve:
     return curve.doubted(FrameStatus.TRACE_AMBIGUOUS, note)
 
 
-def _seen_radius_mm(blur_mm: float, lumen: Lumen, least_voxels: float = 0.0) -> float:
+def _seen_radius_mm(blur_mm: float, lumen: Lumen, least_voxels: float = 0.0, unsure: float = 0.0) -> float:
     """Radius that a line of this blur looks to have: a disc of radius r adds r^2 / 4 to the variance of the blur.
 
-    least_voxels : of the scanner's own, that of the lumen's wall. NaN where this is unknown, and in slices that are
-    thicker than pixels, which have a blur of their own (a ratio of 0 was seen).
+    least_voxels : of the scanner's own, that of the lumen's wall.  unsure : share by which that may be too large.  NaN
+    where it is unknown, and in slices that are thicker than pixels, which have a blur of their own (a ratio of 0 was
+    seen).
     """
     spacing_mm: NDArray[np.float64] = np.asarray(lumen.distance.spacing_mm)
     if not spacing_mm.max() < 1.2 * spacing_mm.min():
         return float("nan")
-    scanner = np.maximum(lumen.levels.get("scanner_blur_mm", np.nan), least_voxels * spacing_mm.min())
+    walls = (1.0 - unsure) * lumen.levels.get("scanner_blur_mm", np.nan)
+    scanner = np.maximum(walls, least_voxels * spacing_mm.min())
     return 2.0 * float(np.sqrt(np.maximum(0.0, blur_mm**2 - scanner**2)))
