@@ -14,7 +14,6 @@ from pipeline.arrays.fingerprint import known_with_place
 from pipeline.arrays.grids import in_memory_order, reorder
 from pipeline.model import Lumen, Volume
 from pipeline.segment import bone, leaked, thin, uneven, valley
-from pipeline.segment.bulges import without_bulges
 from pipeline.segment.config import SegmentConfig
 from pipeline.segment.contact import warning
 from pipeline.segment.cut_off import cut_off
@@ -177,8 +176,6 @@ def segment(
     scan, axes = in_memory_order(volume)
     found = _beside_wire(scan, seeds_mm, config, wire_radius_mm)
     grid, region, site, wall, blur = found.grid, found.region, found.site, found.wall, found.blur
-    if wire_radius_mm is not None:
-        wall.values[...] = without_bulges(found.distance, grid, site.corner, wall.levels)
     boxed = grid, found.distance, site.corner, wall.levels
     touching, bright = side_by_side(
         lambda: open_ones(*boxed, region.taps, wall.sides is None), lambda: bone.touching(*boxed)

@@ -49,6 +49,9 @@ BEND_SHARE = 0.0125
 wires have 1 voxel of them, hooks of 3 to 7 voxels 10 to 20 at their tips, which are 0.1 to 0.2 voxel off."""
 WALL_ERROR, WALL_REACH = 0.13, 5.0
 """Error (voxel) of a wire beside a wall that no reference shows, and the distance (voxel) at which it is gone."""
+BULGE_ERROR, BULGE_REACH = 0.35, 2.7
+"""The same of a wire on the wall of a lumen that was segmented with the wire in it: the wall bulges out by 1.2 voxels
+beside a bright wire, and what is taken for background there pulls the line inwards, by 0.27 to 0.44 voxel."""
 PLAIN_TIP, BRIGHT_TIP, DIM_TIP = 0.08, 0.16, 0.25
 """Error (voxel) of the tip that is not due to noise: of a plain wire, of one with a bright coil or band, of one with
 a dim end. With 0.08 a platinum tip was 2.5 times its sigma off, with 0.25 a fifth of it."""
@@ -204,8 +207,9 @@ def _model_error(image: Subtraction, best: Candidate) -> Array:
     if not image.without_reference:
         return np.asarray(bends)
     depth = -image.depth_at(best.points) / image.voxel
-    wall = WALL_ERROR * image.voxel * np.clip((WALL_REACH - depth) / 3.0, 0.0, 1.0)
-    return np.asarray(np.hypot(bends, wall))
+    wall = WALL_ERROR * np.clip((WALL_REACH - depth) / 3.0, 0.0, 1.0)
+    bulge = BULGE_ERROR * np.clip((BULGE_REACH - depth) / 1.2, 0.0, 1.0)
+    return np.asarray(np.hypot(bends, image.voxel * np.hypot(wall, bulge)))
 
 
 def _own_tip(image: Subtraction, tube: Tube) -> float:
