@@ -91,9 +91,8 @@ def _doubts(values: Array, spacing_mm: Array) -> str:
     least, steep = float(values.min()), steepness(values, spacing_mm)
     if least > -NO_LUMEN * spacing_mm.min():
         return (
-            f"the least value is {least:.2g} mm, so that the grid holds no lumen: distances are negative inside; of a "
-            "mask take distance_transform_edt(~mask, spacing_mm) less distance_transform_edt(mask, spacing_mm), of a "
-            "distance to a centreline subtract the vessel's radius"
+            f"the least value is {least:.2g} mm, so that the grid holds no lumen: distances are negative inside; "
+            f"{MAKE_A_DISTANCE}; of a distance to a centreline subtract the vessel's radius"
         )
     if FLAT <= steep <= STEEP or np.isnan(steep):
         return ""

@@ -83,7 +83,8 @@ def unknowns(walls_N_mm2: Sequence[float], friction: float, *, weighed: bool) ->
     for stiffness in sorted(set(walls_N_mm2)):
         what = f"factor on wall stiffness over the wire's, walls stated at {stiffness:g} N/mm2"
         found.append(replace(_factor(f"{WALL}:{stiffness:g}", 1.5, 100.0, 0.1, what), stated_N_mm2=stiffness))
-    found.append(Unknown(FRICTION, friction, 0.1, 0.0, 0.5, 0.01, 0.02, "Coulomb's coefficient of wire and wall"))
+    most = max(0.5, 2.0 * friction)
+    found.append(Unknown(FRICTION, friction, 0.1, 0.0, most, 0.01, 0.02, "Coulomb's coefficient of wire and wall"))
     if weighed:
         found.append(_factor(BENDING, 0.7, 10.0, 0.05, "factor on the wire's stiffness, wall and wire together"))
     return tuple(found)

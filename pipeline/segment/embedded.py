@@ -26,8 +26,9 @@ GAP = 0.04
 """Least share of the contrast between the two plateaus: a vessel of hardly any noise has groups of 0.01."""
 FURTHER_VOXELS = 1.0
 """How much deeper than the plateau begins the vessel's own wall must lie, to be none that was found."""
-WITHIN = 0.8
-"""Share of that wall: 0.95 and more in a block or a tube, 0.5 where medium has settled."""
+WITHIN = 0.52
+"""Share of that wall: 0.95 in a block or a tube, 0.56 where the vessel leaves it at both ends, up to 0.45 where medium
+has settled."""
 
 
 class Block(NamedTuple):

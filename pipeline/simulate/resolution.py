@@ -15,6 +15,7 @@ from pipeline.arrays.polyline import at_arc
 from pipeline.model import Array, arc_length
 from pipeline.simulate.config import COARSEST_MM, Segment
 from solver import Solution
+from solver.wire import SEGMENT_MM
 
 FINEST_MM = 0.0625
 FIRST_TURN_RAD = 0.1
@@ -56,8 +57,10 @@ def lengths_mm(asked: Segment, rest_curvature_per_mm: ArrayLike) -> list[float]:
     rest = np.asarray(rest_curvature_per_mm, dtype=float)
     curvature = float(np.abs(rest if rest.ndim == 0 else rest[:, 1]).max())
     if asked != "auto":
-        # GuideWire takes no segment that turns by more than a right angle at rest
-        return [2 * asked, asked] if 2 * asked * curvature < np.pi / 2 else [asked]
+        # GuideWire takes no segment that turns by more than a right angle at rest, or is longer than that
+        return (
+            [2 * asked, asked] if 2 * asked < min(0.5 * np.pi / max(curvature, 1e-9), SEGMENT_MM.largest) else [asked]
+        )
     first = COARSEST_MM
     while first > 2 * FINEST_MM and first * curvature > FIRST_TURN_RAD:
         first /= 2
@@ -79,8 +82,8 @@ def resolve(insert: Insert, lengths: Sequence[float]) -> Resolved:
         before = finer
         if len(lengths) > 2 and _reached(finer) < _reached(wires):
             reason = "with shorter ones fewer depths are reached"
-            if np.isnan(num).all():  # what is left in the longer ones is a third more
-                num, push = _bounds(4.0 / 3.0 * moved, 4.0 / 3.0 * pushed)
+            if np.isnan(num).all():  # of the longer ones, whose error is four times that of the shorter
+                num, push = _bounds(*(4.0 * change for change in _moved(wires, finer)))
             continue
         # a wire that is about to snap goes one way or the other for tiny causes, with segments of any length
         away = ~(moved <= AGREED_MM) & np.array([not wire.uncertain for wire in finer], dtype=bool)
@@ -90,7 +93,9 @@ def resolve(insert: Insert, lengths: Sequence[float]) -> Resolved:
             reason = f"halving them moved no wire by more than {AGREED_MM} mm, near snaps apart"
             break
         if np.isnan(moved[away]).all():
-            reason = f"at {int(away.sum())} of {len(num)} depths no wire came to rest, with shorter ones as with longer"
+            reason = (
+                f"at {int(away.sum())} of {len(num)} depths the wire came to rest with one length alone, or with none"
+            )
         else:
             reason = f"at {int(away.sum())} of {len(num)} depths the wire still depends on their length"
     if segment == lengths[0] and len(lengths) > 1:

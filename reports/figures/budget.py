@@ -70,7 +70,7 @@ def _by_entry(axes: Axes, table: pd.DataFrame) -> None:
     axes.set_yticks(places, [f"clamp {clamp},\ndepth {depth}" for clamp, depth in rows], fontsize=8)
     axes.set_ylim(len(table) - 0.5, -0.5)
     most = float(np.nanmax(table[["rms_mm", "distal10_rms_mm", "tip_median_mm"]].to_numpy(dtype=float)))
-    axes.set_xlim(0.0, 1.1 * most or None)  # marks at the right end are whole, however near to each other they are
+    axes.set_xlim(0.0, 1.1 * most if most > 0.0 else None)  # marks at the right end are whole, however near they are
     axes.set_xlabel("distance to the traced wire, mm")
     plain(axes)
     legend(axes, ncols=3, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.1, columnspacing=0.8)

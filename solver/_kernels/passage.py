@@ -16,10 +16,8 @@ from solver._kernels.flags import inlined, kernel, merged
 
 @merged
 def note_passage(problem: Problem, at: Any, k: int, depth: float, segment: float) -> None:
-    """Note where a wire has passed through itself in the step to a depth, mm; forget it once its hind strand is out, or
-    a catheter, in which it is straight, is pushed to its tip.
-    """
-    if depth < at.hind or at.next >= depth:
+    """Note where a wire has passed through itself in the step to a depth, mm; forget it once its hind strand is out."""
+    if depth < at.hind:
         at.passed = at.hind = math.inf
     hind = passage(problem, k, segments_at(at.inserted, segment)[0], segment)
     if hind > 0.0:

@@ -33,7 +33,7 @@ from pipeline.simulate.clamp import Clamp
 from pipeline.status import FrameStatus
 from pipeline.trace import FAINT_BEYOND, GOES_ON, of_catheter, of_length
 from pipeline.trace.config import TraceConfig
-from reports.doubts import Doubt
+from reports.doubts import Caveats
 from solver.grid import Grid
 from tests.pipeline.doubts import dim, frames, with_gap
 
@@ -70,7 +70,7 @@ def test_depths_counted_from_elsewhere_are_a_warning() -> None:
     """1.5 mm in every frame, within the tolerance of each: 16 of 18 ok, and nothing was said."""
     (said,) = elsewhere([d - 1.5 for d in DEPTHS], DEPTHS)
     assert said.startswith("the traced wires are 1.5 mm shorter than insertion_mm states (median of 6 frames)")
-    assert Doubt(warnings=[said]).against, "pages name it first"
+    assert Caveats(warnings=[said]).against, "pages name it first"
     assert elsewhere([d - 0.4 for d in DEPTHS], DEPTHS) == []
     assert elsewhere([d - 1.5 for d in DEPTHS[:3]], DEPTHS[:3]) == []
     assert elsewhere(DEPTHS, [float("nan")] * 6) == []
@@ -87,7 +87,7 @@ def test_a_scale_that_is_off_is_told_where_depths_were_read_well() -> None:
     for scale in (1.03, 0.985):
         (text,) = said([scale * d + 0.3 + rng.normal(scale=0.02) for d in DEPTHS])
         assert text.startswith(f"the traced wires grow {scale:.2f}"[:-1]), text
-        assert Doubt(warnings=[text]).against
+        assert Caveats(warnings=[text]).against
     assert not said([1.03 * d for d in DEPTHS[:3]], DEPTHS[:3]), "too few"
     assert not said([1.005 * d for d in DEPTHS])
     assert not said([20.0] * 6, [20.0] * 6)
@@ -119,7 +119,7 @@ def test_an_entry_before_the_wire_begins_counts_as_depth() -> None:
     assert said.startswith(
         "the traced wires are 1.5 mm longer than insertion_mm states and begin 1.5 mm beyond entry_mm"
     )
-    assert Doubt(warnings=[said]).against
+    assert Caveats(warnings=[said]).against
     assert elsewhere([d - 1.5 for d in DEPTHS], DEPTHS, -1.5) == []
     seen = frames(DEPTHS, DEPTHS)
     assert all(f.ok for f in to_depth(seen, from_entry(seen, -1.5), 2.0))
@@ -135,7 +135,7 @@ def test_frames_in_another_order_are_named_as_such() -> None:
     assert said.startswith(
         "the traced wires have the depths that insertion_mm states, of other frames (4 of 5): that of"
     )
-    assert Doubt(warnings=[said]).against
+    assert Caveats(warnings=[said]).against
     assert "frame 0, 26.0 mm, is of frame 4; are frames and insertion_mm in one order?" in said
     for lengths in (DEPTHS[:5], [10.0, 14.0, 12.0, 22.0, 26.0], [d + 3.0 for d in DEPTHS[:5]]):
         other = frames(lengths, DEPTHS[:5])

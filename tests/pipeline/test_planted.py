@@ -28,7 +28,7 @@ from pipeline.run.kin import told_of_kin
 from pipeline.run.overall import Found, found_cases, phantoms_of, strangers
 from pipeline.run.results import untold
 from pipeline.run.traced import compare_of
-from reports.doubts import Doubt
+from reports.doubts import Caveats
 from tests.later import later
 
 # a manifest that states another wire has the same lumen and the same traces
@@ -142,7 +142,7 @@ def test_the_scans_speak_against_what_is_stated_wrongly(
     found = [text for text in result["warnings"] if "as stated" in text]
     assert len(found) == bool(said)
     assert all(said in text for text in found), found
-    assert Doubt(warnings=result["warnings"]).against == "".join(found), "it is what a page names first"
+    assert Caveats(warnings=result["warnings"]).against == "".join(found), "it is what a page names first"
 
 
 @pytest.mark.slow  # a whole study is run once more for it

@@ -14,7 +14,7 @@ from pipeline.run.stages.known import Frame
 from pipeline.run.stages.trace import _first_said
 from pipeline.segment.shown import LumenDoubt, beside_the_wall
 from pipeline.status import FrameStatus
-from reports.doubts import Doubt
+from reports.doubts import Caveats
 from solver import Grid
 from tests.pipeline.phantoms import helix
 
@@ -54,7 +54,7 @@ def test_a_lumen_that_fits_is_nothing_to_speak_of(tube: Grid, by_mm: float) -> N
 def test_a_lumen_of_another_size_is_told_by_how_much(tube: Grid, by_mm: float) -> None:
     """A mask dilated by one voxel multiplied the error by 3.5, and nothing was said."""
     told, far = beside_the_wall(larger(tube, by_mm), scan_of(tube))
-    assert Doubt(warnings=[told]).against, "pages name it first"
+    assert Caveats(warnings=[told]).against, "pages name it first"
     assert far is (abs(by_mm) > 2.0 * VOXEL)
     assert ("outside the wall" if by_mm > 0 else "inside the wall") in told
     found = float(told.partition("lies ")[2].partition(" mm")[0])

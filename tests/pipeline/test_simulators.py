@@ -21,7 +21,7 @@ from pipeline.run.stages import others
 from pipeline.run.stages.known import Known
 from reports import tables
 from reports.case_page import render_case
-from reports.doubts import AMONG, COUNT_AS, MADE_FROM_TRACES, OF_THEIR_RUN, Doubt
+from reports.doubts import AMONG, COUNT_AS, MADE_FROM_TRACES, OF_THEIR_RUN, Caveats
 from reports.nearer import nearer
 from reports.run_page import render_index
 from reports.schema import ERRORS, FAILURES, POINTS, SIMULATORS, SUMMARY, WHERE
@@ -548,7 +548,7 @@ def test_insertions_that_look_like_one_have_no_green_badge(tmp_path: Path) -> No
     (out / AMONG).write_text(json.dumps({"doubts": [f"insertions 'a', 'b' tell no more than one{COUNT_AS}2"]}))
     page = render_index(out).read_text(encoding="utf-8")
     assert '<span class="status poor">insertions look like one</span>' in page
-    said = verdict({"rms_mm": 0.2}, doubt=Doubt(twins="insertions 'a', 'b' tell no more than one"))
+    said = verdict({"rms_mm": 0.2}, caveats=Caveats(twins="insertions 'a', 'b' tell no more than one"))
     assert said.endswith("But insertions look like one that was scanned again, and count as several: see the warnings.")
 
 

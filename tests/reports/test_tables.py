@@ -28,7 +28,7 @@ ERRORS_HEADER = (
     "energy_score_mm,released,released_at_mm,trace_mean_mm,"
     "trace_max_mm,trace_tip_mm,truth_rms_mm,truth_tip_mm"
 )
-POINTS_HEADER = "frame,status,arc_mm,x_mm,y_mm,z_mm,error_mm,foot_arc_mm,contact_force_N,u_val_mm,error_over_u"
+POINTS_HEADER = "frame,arc_mm,x_mm,y_mm,z_mm,error_mm,foot_arc_mm,contact_force_N,u_val_mm,error_over_u,status"
 SUMMARY_HEADER = (
     "case,group,role,status,frames,frames_ok,frames_failed,insertions,interval,effective_frames,rms_mm,"
     "release_frames,rms_calm_mm,releases_both,releases_missed,releases_spurious,rms_low_mm,rms_high_mm,mean_mm,"

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.ndimage import gaussian_filter
 
-from solver import Catheter, Grid, GuideWire, Insertion, Insertions, VesselWall
+from solver import Grid, GuideWire, Insertion, Insertions, VesselWall
 from solver.self_contact import self_overlap_mm
 from tests.naive.passes import closest_mm
 from tests.naive.writhe import writhe
@@ -90,9 +90,9 @@ def sac() -> VesselWall:
     return VesselWall(Grid(distance, [0.4] * 3, [axes[0][0], axes[1][0], axes[2][0]]), 20.0)
 
 
-def in_sac(catheter: Catheter | None = None) -> Insertion:
+def in_sac() -> Insertion:
     wire = GuideWire(0.5, RADIUS, [[0, 0.3], [20, 0.3], [40, 2.0]], [[0, 0.2], [15, 0.2], [15, 0.0]])
-    return Insertion(wire, sac(), [-0.23, 0.75, -14.0], [0, 0, 1], catheter=catheter)
+    return Insertion(wire, sac(), [-0.23, 0.75, -14.0], [0, 0, 1])
 
 
 def test_a_wire_that_passed_through_itself_between_two_depths_says_so_from_there_on() -> None:
@@ -107,15 +107,6 @@ def test_a_wire_that_passed_through_itself_between_two_depths_says_so_from_there
         still, out = twin.to_depths([48.0, 5.0], 160.0)
         assert still.passed_itself_mm <= after.passed_itself_mm, "both strands are in the sac still"
         assert math.isinf(out.passed_itself_mm), "the hind strand is out"
-
-
-def test_a_wire_that_a_catheter_covers_to_its_tip_has_forgotten_that_it_passed_through_itself() -> None:
-    """Frames that were right were refused: within the catheter both strands are one straight line."""
-    sheathed = in_sac(Catheter(2.0, 0.3))
-    depths, tips = [45.0, 55.0, 55.0, 20.0, 22.0], [0.0, 0.0, 10.0, 20.0, 15.0]
-    found = list(sheathed.to_depths(depths, 160.0, tips))
-    assert all(wire.converged for wire in found)
-    assert [math.isinf(wire.passed_itself_mm) for wire in found] == [True, False, False, True, True]
 
 
 def test_a_helix_that_slides_along_a_tube_does_not_pass_through_itself() -> None:

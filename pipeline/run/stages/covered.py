@@ -28,7 +28,7 @@ def too_thick(what: str, radius_mm: float, lines: Mapping[int, Array], wall: Ves
     """A warning where the lumen has no room for a wire or a catheter. lines : where it lies, (n, 3) by frame."""
     least, where, count = np.inf, "", 0
     for frame, points in lines.items():
-        if not len(points):
+        if not len(points) or radius_mm == 0.0:
             continue
         room = room_mm(wall, points, radius_mm)
         worst = int(np.argmin(room))
@@ -57,11 +57,12 @@ def room_mm(wall: VesselWall, points_mm: Array, radius_mm: float) -> Array:
     wide enough for it is called narrow, the closed end behind an entry included.
     """
     at, room = np.array(points_mm), np.full(len(points_mm), -np.inf)
+    outside = np.maximum(wall.look_up(at)[0], 0.0)[:, None]
     for _ in range(CLIMB_STEPS + 1):
         distance, slope, _ = wall.look_up(at)
         room = np.maximum(room, -distance)
         steep = np.linalg.norm(slope, axis=1, keepdims=True)
-        at = at - CLIMB_RADII * radius_mm / CLIMB_STEPS * slope / np.where(steep > 0.0, steep, 1.0)
+        at = at - (outside + CLIMB_RADII * radius_mm) / CLIMB_STEPS * slope / np.where(steep > 0.0, steep, 1.0)
     return room
 
 

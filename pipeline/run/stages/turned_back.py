@@ -28,9 +28,10 @@ def turned_back(wall: VesselWall, entry_mm: Array, wires: Mapping[int, Array]) -
     )
     if ways is None:
         return []
-    inside, far = cKDTree(distance.to_mm(ways.voxels.astype(float))), {}
+    known = np.isfinite(ways.total)  # a piece of lumen that no way leads to tells nothing
+    inside, far = cKDTree(distance.to_mm(ways.voxels[known].astype(float))), {}
     for frame, joints in wires.items():
-        way = ways.total[inside.query(joints)[1]]
+        way = ways.total[known][inside.query(joints)[1]]
         back = np.maximum.accumulate(way) - way
         last = int(np.argmax(back))
         turns = int(np.argmax(way[: last + 1]))
