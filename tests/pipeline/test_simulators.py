@@ -111,14 +111,14 @@ def test_every_pair_on_the_frames_that_count_in_both(compared: Path) -> None:
 
 
 def test_each_row_says_which_interval_rests_on_fewer_insertions(tmp_path: Path) -> None:
-    """Ends of skill were missing beside "wide: 3 insertions", and one row in five said why."""
+    """Ends of skill were missing beside "from 3 insertions only", and one row in five said why."""
     studies = {"wireval": write_tree(tmp_path / "wireval", even(0.2))}
     studies["a"] = write_tree(tmp_path / "a", even(0.4), failed=tuple((c, f) for c in range(3) for f in range(4)))
     write_comparison(tmp_path, studies)
     alone = pd.read_csv(tmp_path / "simulators.csv").query("against.isna()").set_index("simulator")
     assert alone["interval"].to_dict() == {
-        "wireval": "over 6 insertions; skill_strongest wide: 3 insertions",
-        "a": "wide: 3 insertions",
+        "wireval": "over 6 insertions; skill_strongest from 3 insertions only",
+        "a": "from 3 insertions only",
     }
     assert list(alone["strongest_frames"]) == [12, 12]
 

@@ -37,8 +37,11 @@ def clamp_of(run: Context, known: Known) -> Clamp:
     passed = beside([frame.curve for frame in seen], given, prior.sigma_mm, voxel_mm) if not known.off_the_scans else ""
     if run.config.simulate.entry == "manifest":
         run.log.warnings += [passed] * bool(passed)
-        unused = f"entry = {run.case.entry!r} is not used: simulate.entry = manifest takes this case's own entry"
-        run.log.assumptions += [unused] * (run.case.entry_case is not None)
+        if run.case.entry_case is not None:
+            unused = (
+                f'entry = "case:{run.case.entry_case.id}" is not used: simulate.entry = manifest takes this case\'s own'
+            )
+            run.log.assumptions.append(unused)
         return given
     if run.case.entry_case is not None:
         return _of_another(run, run.case.entry_case, given, known.frames)
