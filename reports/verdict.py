@@ -13,7 +13,7 @@ from reports.tips import tips_off
 
 _LISTS = re.compile(r" \([^()]*\b(?:frame|case)s? [^()]*\)")  # frame after frame, which the warning itself has
 _WITHHELD = re.compile(r"withheld: (\d+) insertion")
-_FEW = re.compile(r"from (.*) only")  # how the note on an interval over few insertions begins
+_FEW = re.compile(r"from (.*) only")  # the note on an interval over few insertions
 
 
 def verdict(statistics: Mapping[str, Any], simulator: str = "", caveats: Caveats = NO_CAVEATS) -> str:
