@@ -158,6 +158,8 @@ def diff_folders(
         raise ValueError(f"{out_a}: no cases/*/errors.csv; give a folder that `wireval run` wrote")
     beside = {*_unscored(out_a, before, out_b, after), *_unscored(out_b, after, out_a, before)} - {*damaged}
     before, after = ({n: table for n, table in of.items() if n not in beside} for of in (before, after))
+    if not before:
+        raise ValueError(f"{out_a}: nothing to hold against: all of it are calibration cases that {out_b} left out")
     empty = tuple(name for name, table in before.items() if not _has_numbers(table, tolerance))
     if len(empty) == len(before):
         what = "nothing to hold against: no frame of it is ok and has an error that the tolerance names"

@@ -146,6 +146,9 @@ def test_a_calibration_case_of_one_run_alone_is_named_and_not_compared(tmp_path:
     assert len(diff.diff_folders(out, calibrated, load_tolerance()).regressions) == 1, "it was to be computed"
     other = write_run(tmp_path / "other", (learnt,))
     assert len(diff.diff_folders(out, other, load_tolerance()).regressions) == 1, "a case that is scored is missing"
+    elsewhere = write_run(tmp_path / "elsewhere", (FakeCase("e", frames=3),))
+    with pytest.raises(ValueError, match="all of it are calibration cases"):
+        diff.diff_folders(other, elsewhere, load_tolerance())
 
 
 def test_a_folder_without_cases_is_no_reference(tmp_path: Path) -> None:
