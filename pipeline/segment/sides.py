@@ -179,4 +179,5 @@ def _extremes(feet: Array, share: Array, step: int, most: float) -> tuple[float,
 
 def _around(places: cKDTree, values: Array, count: int) -> Array:
     """Means (n,) of the values (n,) of the ``count`` places next to each."""
-    return np.asarray(np.mean(values[places.query(places.data, count)[1]], axis=1))
+    nearest = places.query(places.data, min(count, len(values)))[1]
+    return np.asarray(np.mean(values[nearest].reshape(len(values), -1), axis=1))

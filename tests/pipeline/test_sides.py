@@ -10,7 +10,7 @@ from scipy.special import ndtr
 from pipeline.model import Volume
 from pipeline.segment import segment
 from pipeline.segment.levels import GreyLevels
-from pipeline.segment.sides import Sides
+from pipeline.segment.sides import Sides, _around
 from tests.pipeline import phantoms
 from tests.studies.seeing.table import look
 
@@ -82,3 +82,9 @@ def test_medium_that_has_settled_is_said_and_the_wall_found(seed: int, most: flo
     assert row.verdict == "right"
     assert "the vessel's contrast falls to" in row.text
     assert row.wall < most, "voxel; 0.64 and 0.25 with one level for both sides"
+
+
+def test_of_fewer_places_than_are_averaged_all_are() -> None:
+    """Where hardly any wall has room beside it, scipy's places that are missing were looked up: an IndexError."""
+    places = cKDTree(np.random.default_rng(0).normal(size=(5, 3)))
+    assert _around(places, np.arange(5.0), 400) == pytest.approx(np.full(5, 2.0))
