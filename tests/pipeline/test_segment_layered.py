@@ -89,6 +89,10 @@ def test_a_vessel_darker_than_the_resin_or_hardly_brighter_is_told(greys, noise)
     assert any("surrounds that at the entry" in warning for warning in lumen.warnings)
 
 
+def volume_of(lumen):
+    return np.count_nonzero(lumen.distance.values < 0.0) * float(np.prod(lumen.distance.spacing_mm))
+
+
 def straight(radius_mm, grey_at, noise, voxel=0.5, blur=0.8, wire=None):
     """A straight vessel of 340 in 40, its scan and its volume. grey_at : share of 340 at shares of the radius."""
     half = np.arange(-radius_mm - 5.0, radius_mm + 5.1, voxel)
@@ -107,8 +111,7 @@ def test_a_vessel_of_little_noise_or_with_a_darker_middle_is_whole(radius_mm, da
     """Beam hardening makes the middle darker: it was refused as if the rest were resin."""
     scan, volume = straight(radius_mm, lambda share: 1.0 - darker * (1.0 - share**2), noise)
     lumen = segment(scan, np.array([[0.0, 0.0, 20.0]]))
-    found = np.count_nonzero(lumen.distance.values < 0.0) * float(np.prod(lumen.distance.spacing_mm))
-    assert found == pytest.approx(volume, rel=0.1)
+    assert volume_of(lumen) == pytest.approx(volume, rel=0.1)
     assert not any("surrounds" in warning for warning in lumen.warnings)
 
 
@@ -116,8 +119,7 @@ def test_a_vessel_of_little_noise_or_with_a_darker_middle_is_whole(radius_mm, da
 def test_a_wire_in_its_vessel_is_no_vessel_in_resin(radius_mm, wire):
     scan, volume = straight(radius_mm, np.ones_like, 10.0, 0.4, 1.0, wire)
     lumen = segment(scan, np.array([[0.0, 0.0, 16.0]]), wire_radius_mm=wire[0])
-    found = np.count_nonzero(lumen.distance.values < 0.0) * float(np.prod(lumen.distance.spacing_mm))
-    assert found == pytest.approx(volume, rel=0.1)
+    assert volume_of(lumen) == pytest.approx(volume, rel=0.1)
 
 
 def test_where_all_is_brighter_than_the_seed_no_level_is_taken_from_the_rest():
