@@ -11,9 +11,10 @@ from numpy.typing import ArrayLike
 from pipeline.arrays.grids import unflattened
 from pipeline.segment import valley
 from pipeline.segment._kernels.connect import Affinity
+from pipeline.segment.around_seed import levels_at
 from pipeline.segment.config import SegmentConfig
 from pipeline.segment.connect import connect, connect_relative, estimate_affinity, neighbours
-from pipeline.segment.levels import GreyLevels, Index, Region, failed, levels_at, seed_voxels
+from pipeline.segment.levels import GreyLevels, Index, Region, failed, seed_voxels
 from pipeline.segment.necks import through_necks
 from pipeline.segment.thin import beyond_vessel, branches, low_region
 from solver.grid import Grid

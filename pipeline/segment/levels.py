@@ -1,35 +1,21 @@
-"""The grey levels and noise near the seeds that a segmentation method starts from, and the region that it finds.
+"""The grey levels and noise that a segmentation method starts from, and the region that it finds.
 
 A method is a function like :func:`fuzzy.fuzzy_region`.
 """
 
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import ndimage
 from scipy.special import chndtr
 
 from pipeline.arrays.grids import unflattened
 from pipeline.model import Counters
 from pipeline.segment._kernels.voxels import rebased
-from pipeline.segment.groups import two_groups
-from pipeline.segment.noise import noise_left, smoothed, voxel_noise
 from pipeline.status import FrameStatus, StageError
 from solver.grid import Grid
 
-BOXES_MM = 6.0, 10.0, 17.0, 30.0
-"""Half widths of the box around a seed in which the levels are estimated, the next where the vessel fills one: of a
-carotid artery and what is around it, up to an aorta, of which the first holds nothing but its own noise."""
-LEAST_BOX = 8
-"""Its least half width in voxels."""
-EDGE, APART, WIDE = 0.25, 1.0, 0.2
-"""Share of the contrast below the seed's grey from which a voxel is not the vessel's. Then how far apart two greys
-around it are, over the brighter one's distance from the vessel, and the least share of the box that the brighter one
-fills: medium that has settled is a vessel's second grey, and must be none that surrounds it."""
-LEAST_DARK = 0.05
-"""Least share of the box that lies off the vessel, two voxels from anything as bright."""
 THICK = 5.0
 """Depth over blur from which the grey in the middle of a vessel reaches its plateau."""
 BRIGHTER = 1.25
@@ -90,90 +76,9 @@ def box_from(corner: Index, shape: tuple[int, ...]) -> tuple[slice, ...]:
     return tuple(slice(int(first), int(first) + n) for first, n in zip(corner, shape, strict=True))
 
 
-def _median(values: NDArray[Any], otherwise: float) -> float:
+def median(values: NDArray[Any], otherwise: float) -> float:
+    """The median of values; otherwise of fewer than eight."""
     return float(np.median(values)) if values.size >= 8 else otherwise
-
-
-class _Levels(NamedTuple):
-    """Median grey of the bright region that holds the seed, that of what is darker, the region, and the share that is
-    darker."""
-
-    inside: float
-    outside: float
-    region: NDArray[np.bool_]
-    dark: float
-
-
-def _surroundings(grey: NDArray[Any], seed: float) -> tuple[float, float]:
-    """A first guess of what surrounds the vessel, and the grey below which voxels are no part of that.
-
-    Of two well apart it is the brighter: the other may be air, or what lies beyond a round field of view. They are
-    apart by Ashman's D, as two greys of a vessel are, and by as much as the brighter one is from the vessel.
-    """
-    darkest = float(np.percentile(grey, 10))
-    clear = ~ndimage.binary_dilation(grey > seed - EDGE * (seed - darkest), iterations=2)
-    dark = grey[clear]
-    if dark.size < LEAST_DARK * grey.size:
-        return darkest, -np.inf
-    bright, bottom, top, apart = two_groups(dark)
-    if np.count_nonzero(bright) < WIDE * grey.size or not top - bottom >= max(apart, APART * (seed - top)):
-        return darkest, -np.inf
-    return top, 0.5 * (bottom + top)
-
-
-def _two_levels(grey: NDArray[Any], seed: float, at: tuple[int, ...], known: float | None) -> _Levels:
-    """The two levels in a box, by fixed point. known : the outer one, where it is.
-
-    The region's median is held near the seed's grey, lest bone that touches it be taken for the vessel.
-    """
-    outside, floor = _surroundings(grey, seed) if known is None else (known, np.inf)
-    inside = seed
-    region = apart = np.zeros(grey.shape, bool)
-    for _ in range(6):
-        bright = grey > 0.5 * (inside + outside)
-        if not bright[at]:
-            break
-        labels, _ = ndimage.label(bright)
-        region = labels == labels[at]
-        whole = _median(grey[region], inside)
-        inside = _median(grey[ndimage.binary_erosion(region)], whole)
-        inside = min(inside, seed + 0.5 * (seed - outside))
-        apart = ~ndimage.binary_dilation(bright, iterations=2)
-        outside = _median(grey[apart & (grey > floor)], outside)
-    return _Levels(inside, outside, region, float(np.mean(apart)))
-
-
-def levels_at(grid: Grid, index: NDArray[Any], outside: float | None = None) -> tuple[GreyLevels, NDArray[np.int64]]:
-    """GreyLevels around one seed voxel, and the voxel (3,) to start at: that of median smoothed grey among its 3^3.
-
-    outside : the grey around the vessel, where it is known.
-    """
-    for half in BOXES_MM:
-        levels, found, dark = _levels_in(grid, box_around(grid, index, half, LEAST_BOX), index, outside)
-        if dark >= LEAST_DARK:
-            break
-    return levels, found
-
-
-def _levels_in(
-    grid: Grid, box: tuple[slice, slice, slice], index: NDArray[Any], known: float | None
-) -> tuple[GreyLevels, NDArray[np.int64], float]:
-    """What ``levels_at`` returns, of a box around the seed, and the share of the box that lies off the vessel."""
-    raw = np.asarray(grid.values[box], np.float32)
-    grey = smoothed(raw)
-    start = np.array([s.start for s in box])
-    # a seed may be half a voxel off, and a wire may lie on it: the median of 3^3 voxels is the lumen's still
-    near = box_around(grid, index, 0.0, 1)
-    inner = tuple(slice(s.start - o, s.stop - o) for s, o in zip(near, start, strict=True))
-    around = grey[inner]
-    seed = float(np.median(around))
-    best = np.unravel_index(int(np.argmin(np.abs(around - seed))), around.shape)
-    at = tuple(int(b) + s.start for b, s in zip(best, inner, strict=True))
-    inside, outside, region, dark = _two_levels(grey, seed, at, known)
-    found = start + np.array(at)
-    noise = voxel_noise(raw - grey, region)
-    left = noise_left(raw, region, grey > 0.5 * (inside + outside), noise)
-    return GreyLevels(inside, outside, noise, left, tuple(found.tolist()), inside), found, dark
 
 
 def scanner_blur(blur_mm: float, taps: NDArray[Any], voxel: float) -> float:
@@ -209,13 +114,13 @@ def plateau(scan: Grid, distance: Grid, levels: GreyLevels, blur_mm: float) -> G
         off_wall, grey = off_wall[some], grey[some]
         depth, core = _deepest(off_wall)
     if depth > THICK * blur_mm:
-        return replace(levels, inside=_median(grey[core], levels.inside))
+        return replace(levels, inside=median(grey[core], levels.inside))
     core = core[:: max(1, len(core) // 500)]
     radius = depth + 0.15 * blur_mm * float(np.exp(-depth / blur_mm))
     off_axis = np.maximum(radius - off_wall[core], 0.0)
     aside = ((off_axis / blur_mm) ** 2 + 1e-9).astype(np.float64)
     share = chndtr((radius / blur_mm) ** 2, 2, aside)
-    peak = _median((grey[core] - levels.outside) / np.maximum(share, 0.4), levels.contrast)
+    peak = median((grey[core] - levels.outside) / np.maximum(share, 0.4), levels.contrast)
     return replace(levels, inside=levels.outside + peak)
 
 
