@@ -26,6 +26,8 @@ FITS = 0.55
 in vessels without (27 scenes)."""
 THINNEST = 0.8
 """Voxels: two edges that are nearer to each other are one that is blurred."""
+ONE = [-8.0, 0.4], [4.0, 3.0]
+"""Where one edge and its blur may lie, in voxels."""
 STARTS = (-4.0, 4.0), (-2.0, 2.0), (-0.5, 1.5), (0.0, 3.0)
 """Where the inner edge and how thick the layer may be, in voxels, for the fit to begin with."""
 
@@ -71,7 +73,7 @@ def _layer(off: Array, grey: Array) -> Layer | None:
     contrast = float(np.ptp(grey)) if len(grey) else 0.0
     if contrast <= 0.0 or off[0] > -NEEDED or off[-1] < NEEDED:
         return None
-    one = _fitted(lambda q: _steps(off, q[:1], q[1]), grey, [0.0, 1.0], ([-8.0, 0.4], [4.0, 3.0]))
+    one = _fitted(lambda q: _steps(off, q[:1], q[1]), grey, [0.0, 1.0], ONE)
     if one[1] < ONE_STEP * contrast:
         return None
     room = [-8.0, THINNEST, 0.4], [2.0, 9.0, 2.0]
@@ -79,7 +81,7 @@ def _layer(off: Array, grey: Array) -> Layer | None:
     (inner, thick, blur), misfit, (vessel, layer, beyond) = min(fits, key=lambda fit: fit[1])
     slack = 0.05 * contrast
     ordered = grey.max() + slack > vessel > layer > beyond > grey.min() - slack
-    if not ordered or misfit > FITS * one[1]:
+    if not ordered or misfit > FITS * min(one[1], _fitted(lambda q: _bowed(off, *q), grey, [0.0, 1.0], ONE)[1]):
         return None
     return Layer(vessel, layer, beyond, inner, inner + thick, blur)
 
@@ -97,6 +99,13 @@ def _steps(off: NDArray[Any], edges: Array, blur: float) -> Array:
     """Shares (n, levels) of the greys between blurred edges, at distances (n,)."""
     inside = np.stack([ndtr((edge - off) / blur) for edge in edges], axis=1)
     return np.diff(inside, axis=1, prepend=0.0, append=1.0)
+
+
+def _bowed(off: NDArray[Any], edge: float, blur: float) -> Array:
+    """The same for one edge of a vessel that is brightest in its middle: a parabola within, one grey beyond."""
+    inside, beyond = _steps(off, np.array([edge]), blur).T
+    depth = np.minimum(off - edge, 0.0)
+    return np.stack([inside, inside * depth, inside * depth**2, beyond], axis=1)
 
 
 def _fitted(

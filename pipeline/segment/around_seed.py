@@ -22,16 +22,19 @@ around it are, over the brighter one's distance from the vessel, and the least s
 fills: medium that has settled is a vessel's second grey, and must be none that surrounds it."""
 LEAST_DARK = 0.05
 """Least share of the box that lies off the vessel, two voxels from anything as bright."""
+STEP = 0.3
+"""Least part of the contrast that lies between the two voxels inside a wall and the two outside it: 0.6 at a blur of a
+voxel. In a vessel of 9 mm that is 10 % brighter in its middle 0.2 lies between that and what is around it."""
 
 
 class _Levels(NamedTuple):
-    """Median grey of the bright region that holds the seed, that of what is darker, the region, and the share that is
-    darker."""
+    """Median grey of the bright region that holds the seed, that of what is darker, the region, and how much of its
+    wall is seen: 0 where little is darker, 1 where enough is, 2 where grey falls to that in a step."""
 
     inside: float
     outside: float
     region: NDArray[np.bool_]
-    dark: float
+    seen: int
 
 
 def _surroundings(grey: NDArray[Any], seed: float) -> tuple[float, float]:
@@ -70,7 +73,16 @@ def _two_levels(grey: NDArray[Any], seed: float, at: tuple[int, ...], known: flo
         inside = min(inside, seed + 0.5 * (seed - outside))
         apart = ~ndimage.binary_dilation(bright, iterations=2)
         outside = median(grey[apart & (grey > floor)], outside)
-    return _Levels(inside, outside, region, float(np.mean(apart)))
+    dark = bool(np.mean(apart) >= LEAST_DARK)
+    seen = dark + (dark and _step(grey, region) >= STEP * (inside - outside))
+    return _Levels(inside, outside, region, seen)
+
+
+def _step(grey: NDArray[Any], region: NDArray[np.bool_]) -> float:
+    """Grey in the two voxels inside a region's edge, less that in the two outside it; NaN where it has no edge."""
+    within = region & ~ndimage.binary_erosion(region, iterations=2, border_value=1)
+    around = ndimage.binary_dilation(region, iterations=2) & ~region
+    return median(grey[within], np.nan) - median(grey[around], np.nan)
 
 
 def levels_at(grid: Grid, index: NDArray[Any], outside: float | None = None) -> tuple[GreyLevels, NDArray[np.int64]]:
@@ -78,17 +90,20 @@ def levels_at(grid: Grid, index: NDArray[Any], outside: float | None = None) -> 
 
     outside : the grey around the vessel, where it is known.
     """
+    most = -1
     for half in BOXES_MM:
-        levels, found, dark = _levels_in(grid, box_around(grid, index, half, LEAST_BOX), index, outside)
-        if dark >= LEAST_DARK:
+        now, at, seen = _levels_in(grid, box_around(grid, index, half, LEAST_BOX), index, outside)
+        if seen > most:
+            levels, found, most = now, at, seen
+        if seen == 2:
             break
     return levels, found
 
 
 def _levels_in(
     grid: Grid, box: tuple[slice, slice, slice], index: NDArray[Any], known: float | None
-) -> tuple[GreyLevels, NDArray[np.int64], float]:
-    """What ``levels_at`` returns, of a box around the seed, and the share of the box that lies off the vessel."""
+) -> tuple[GreyLevels, NDArray[np.int64], int]:
+    """What ``levels_at`` returns, of a box around the seed, and how much of the wall is seen in it."""
     raw = np.asarray(grid.values[box], np.float32)
     grey = smoothed(raw)
     start = np.array([s.start for s in box])
@@ -99,8 +114,8 @@ def _levels_in(
     seed = float(np.median(around))
     best = np.unravel_index(int(np.argmin(np.abs(around - seed))), around.shape)
     at = tuple(int(b) + s.start for b, s in zip(best, inner, strict=True))
-    inside, outside, region, dark = _two_levels(grey, seed, at, known)
+    inside, outside, region, seen = _two_levels(grey, seed, at, known)
     found = start + np.array(at)
     noise = voxel_noise(raw - grey, region)
     left = noise_left(raw, region, grey > 0.5 * (inside + outside), noise)
-    return GreyLevels(inside, outside, noise, left, tuple(found.tolist()), inside), found, dark
+    return GreyLevels(inside, outside, noise, left, tuple(found.tolist()), inside), found, seen
