@@ -115,6 +115,15 @@ def test_a_vessel_of_little_noise_or_with_a_darker_middle_is_whole(radius_mm, da
     assert not any("surrounds" in warning for warning in lumen.warnings)
 
 
+@pytest.mark.parametrize(("radius_mm", "brighter", "noise"), [(9.0, 0.06, 1.0), (9.0, 0.25, 20.0), (4.0, 0.4, 10.0)])
+def test_a_vessel_with_a_brighter_middle_is_whole(radius_mm, brighter, noise):
+    """It came out at a third: one that fills the box around its seed was its middle, or had "a layer" around that."""
+    scan, volume = straight(radius_mm, lambda share: 1.0 + brighter * (1.0 - share**2), noise)
+    lumen = segment(scan, np.array([[0.0, 0.0, 20.0]]))
+    assert volume_of(lumen) == pytest.approx(volume, rel=0.1)
+    assert not any("surrounds" in warning for warning in lumen.warnings)
+
+
 @pytest.mark.parametrize(("radius_mm", "wire"), [(3.0, (0.6, 700.0)), (4.0, (0.445, 900.0))])
 def test_a_wire_in_its_vessel_is_no_vessel_in_resin(radius_mm, wire):
     scan, volume = straight(radius_mm, np.ones_like, 10.0, 0.4, 1.0, wire)
