@@ -400,11 +400,13 @@ def test_two_slices_are_a_volume_and_one_is_none(tmp_path: Path) -> None:
         read_header(tmp_path / "1.mha")
 
 
-def test_nan_voxels_are_refused(tmp_path: Path) -> None:
-    values = numbered().astype(np.float32)
-    values[1, 2, 3] = np.nan
+@pytest.mark.parametrize("grey", [np.nan, -np.inf, 1e20, 1e300])
+def test_voxels_that_are_no_grey_are_refused(tmp_path: Path, grey: float) -> None:
+    """Squares of 1e20 overflowed, and no frame of its case had a result."""
+    values = numbered().astype(np.float64)
+    values[1, 2, 3] = grey
     sitk.WriteImage(image_of(values), str(tmp_path / "scan.mha"))
-    with pytest.raises(LoadError, match="1 voxels are NaN"):
+    with pytest.raises(LoadError, match="1 voxels are NaN, infinite or beyond 1e"):
         load(read_header(tmp_path / "scan.mha"))
 
 
