@@ -2,7 +2,7 @@
 
 import math
 from functools import partial
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema
 from pydantic_core import PydanticCustomError
@@ -23,6 +23,7 @@ def _number(value: Any) -> Any:
 
 Number = BeforeValidator(_number)
 Finite = Annotated[float, Field(ge=-1e9, le=1e9, allow_inf_nan=False), Number]
+PerFrame = Annotated[tuple[Finite, ...], Field(min_length=1)]
 Positive = Annotated[float, Field(gt=0, le=1e9, allow_inf_nan=False), Number]
 NonNegative = Annotated[float, Field(ge=0, le=1e9, allow_inf_nan=False), Number]
 Share = Annotated[float, Field(ge=0, le=1), Number]
@@ -33,6 +34,7 @@ Reach = Annotated[float, Field(ge=0.1, le=50, allow_inf_nan=False), Number]
 """A distance beside a vessel or along it, mm."""
 Depth = Annotated[float, Field(gt=0, le=5000, allow_inf_nan=False), Number]
 """Insertion depth, mm: no wire is longer than 5 m."""
+Depths = Annotated[tuple[Depth, ...], Field(min_length=1)]
 Offset = Annotated[float, Field(ge=-50, le=50, allow_inf_nan=False), Number]
 """What stated depths are off by, mm."""
 Factor = Annotated[float, Field(ge=1e-6, le=1e6, allow_inf_nan=False), Number]
@@ -40,6 +42,7 @@ Friction = Annotated[float, Field(ge=0, le=10, allow_inf_nan=False), Number]
 """Coulomb's coefficient: a hydrophilic wire has 0.01 to 0.1."""
 Turn = Annotated[float, Field(ge=-1e5, le=1e5, allow_inf_nan=False), Number]
 """An angle, degrees."""
+Roll = Turn | Annotated[tuple[Turn, ...], Field(min_length=1)] | Literal["fit"]
 Spread = Annotated[float, Field(ge=0, le=180, allow_inf_nan=False), Number]
 """Standard deviation of an angle, degrees: beyond half a turn nothing is known of it."""
 Step = Annotated[float, Field(ge=0.01, le=100, allow_inf_nan=False), Number]

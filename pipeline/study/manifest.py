@@ -24,7 +24,7 @@ from pydantic import (
 from pydantic.config import JsonDict
 
 from pipeline.model import OverWire, Uncertainty, Wall, Wire
-from pipeline.ranges import Axis, Depth, Direction, Finite, Name, NonNegative, Number, Point, Positive, Spread, Strict
+from pipeline.ranges import Axis, Depths, Direction, Name, NonNegative, Number, PerFrame, Point, Positive, Roll, Spread, Strict
 from pipeline.status import InputError, did_you_mean
 from pipeline.study.case_rules import borrowing_problems, catheter_problems
 from pipeline.study.others import LONGEST_NAME, OthersText
@@ -54,10 +54,6 @@ IDS: JsonDict = {"$comment": f"up to {LONGEST_NAME} letters, digits and . _ -, a
 ANOTHER: JsonDict = {"$comment": '"case:ID", with the id of another case'}
 LEAST_ACROSS_DEG = 5.0
 """Between material_axis and entry_direction: more than a clamp's direction is found to be off by."""
-
-
-Depths = Annotated[tuple[Depth, ...], Field(min_length=1)]
-PerFrame = Annotated[tuple[Finite, ...], Field(min_length=1)]
 
 
 class Case(Strict):
@@ -91,7 +87,7 @@ class Case(Strict):
     calibrated_kin: Annotated[str, *FILLED_IN] = ""
     calibrated_scans: Annotated[tuple[str, ...], *FILLED_IN] = ()
     calibrated_traces: Annotated[tuple[tuple[Point, ...], ...], *FILLED_IN] = ()
-    roll_deg: Finite | PerFrame | Literal["fit"] = 0.0
+    roll_deg: Roll = 0.0
     roll_sigma_deg: Spread | None = None
     push_force_N: PerFrame | None = None
     push_force_sigma_N: Positive = 0.001

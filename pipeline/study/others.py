@@ -25,7 +25,9 @@ class Others(Strict):
 
 
 def written_out(value: Any) -> Any:
-    """A pattern or a list stands for the files alone."""
+    """A pattern or a list stands for the files alone; a table names some."""
+    if isinstance(value, dict) and "files" not in value:
+        raise ValueError("a table without files; write {files = ...}, or leave the key out")
     return {"files": value} if isinstance(value, (str, list)) else value
 
 

@@ -190,6 +190,8 @@ def test_uint16_beyond_32767_is_not_folded(tmp_path: Path) -> None:
         ("frames", '["a/../../b.mha"]', "leads out of the manifest's folder"),
         ("frames", '"/**/*.mha"', "whole machine"),
         ("frames", "[]", "an empty list"),
+        ("simulated", '{space = "RAS"}', "a table without files"),
+        ("roll_deg", "1e9", "from -100000 to 100000"),
         ("frames", '"' + "x" * 300 + '.mha"', "a name of 304 bytes"),
         ("wire", "[]", "not among"),
         ("reference", '""', "an empty name"),
