@@ -1,6 +1,7 @@
-"""What the keys of a case must be to each other: the catheter to its wire, a case to the one whose clamp it borrows."""
+"""What the keys of a case must be to each other: the catheter to its wire, lists to the frames, borrowed clamps."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
 
 from pipeline.model import OverWire
 from pipeline.status import did_you_mean
@@ -38,3 +39,12 @@ def borrowing_problems(cases: Mapping[str, tuple[str, bool]]) -> list[str]:
             what = "name one with frames of its own and no entry of another"
             problems.append(f"case {case!r}: entry = {entry!r} shows no clamp; {what}")
     return problems
+
+
+def not_one_per_frame(lists: dict[str, Any], count: int) -> list[str]:
+    """A sentence for each list that does not have one entry per frame; a single number and None stand for all."""
+    return [
+        f"{name} has {len(values)} entries for {count} frames; give one per frame"
+        for name, values in lists.items()
+        if isinstance(values, Sequence) and len(values) not in (0, count)
+    ]

@@ -14,8 +14,9 @@ from pipeline.load.views import read_views
 from pipeline.load.wires import read_wires
 from pipeline.simulate.others import oddity
 from pipeline.status import nearest
+from pipeline.study.case_rules import not_one_per_frame
 from pipeline.study.coarse import too_coarse
-from pipeline.study.manifest import Case, not_one_per_frame
+from pipeline.study.manifest import Case
 from pipeline.study.own_lumen import fitting, lumen_problems
 from pipeline.study.parameters import ParametersError, read_parameters
 from pipeline.study.same_grid import apart

@@ -24,9 +24,22 @@ from pydantic import (
 from pydantic.config import JsonDict
 
 from pipeline.model import OverWire, Uncertainty, Wall, Wire
-from pipeline.ranges import Axis, Depths, Direction, Name, NonNegative, Number, PerFrame, Point, Positive, Roll, Spread, Strict
+from pipeline.ranges import (
+    Axis,
+    Depths,
+    Direction,
+    Name,
+    NonNegative,
+    Number,
+    PerFrame,
+    Point,
+    Positive,
+    Roll,
+    Spread,
+    Strict,
+)
 from pipeline.status import InputError, did_you_mean
-from pipeline.study.case_rules import borrowing_problems, catheter_problems
+from pipeline.study.case_rules import borrowing_problems, catheter_problems, not_one_per_frame
 from pipeline.study.others import LONGEST_NAME, OthersText
 from pipeline.study.sources import MaskText, PathText, Sources, SourceText, read_tables
 from pipeline.wording import WRITTEN_HERE, Place, as_toml, said, saying, sentences
@@ -177,15 +190,6 @@ class Case(Strict):
             return []
         found = f"material_axis = {list(self.material_axis)} is within {LEAST_ACROSS_DEG:g} degrees of entry_direction"
         return [f"{found}; give a direction across the wire, where its curved tip points at roll 0, or leave it out"]
-
-
-def not_one_per_frame(lists: dict[str, Any], count: int) -> list[str]:
-    """A sentence for each list that does not have one entry per frame; a single number and None stand for all."""
-    return [
-        f"{name} has {len(values)} entries for {count} frames; give one per frame"
-        for name, values in lists.items()
-        if isinstance(values, Sequence) and len(values) not in (0, count)
-    ]
 
 
 class ManifestTables(Strict):

@@ -7,8 +7,9 @@ from pipeline.load.curves import read_truth
 from pipeline.load.geometry import LoadError
 from pipeline.load.views import read_views
 from pipeline.run.stages.known import Context, Frame, Known
+from pipeline.study.case_rules import not_one_per_frame
 from pipeline.study.devices import implausible
-from pipeline.study.manifest import Case, not_one_per_frame
+from pipeline.study.manifest import Case
 from pipeline.study.plausible import in_case, measured_otherwise, odd_truth
 
 
