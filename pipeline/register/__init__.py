@@ -1,7 +1,8 @@
 """register: how far the phantom moved between the reference and a frame, so that the frame can be put back in place.
 
 A cheap look at the lumen's wall comes first (least squares at a few thousand points); only a frame that moved by more
-than a tenth of a voxel is registered (SimpleITK), and the cheap look then sharpens the result and says what is left.
+than a tenth of a voxel is registered: by least squares from coarse to fine, or from SimpleITK's result where these do
+not agree. The cheap look then says what is left.
 """
 
 from dataclasses import dataclass, field
@@ -30,6 +31,11 @@ CLEARLY = 0.8
 """Least squares without SimpleITK is believed where its misfit is smaller by this factor."""
 STRUCTURE_POINTS = 12000
 """Points on walls and bones that a moved frame is fitted at."""
+COARSE = (4.0, 1500), (2.0, 4000)
+"""Blurs, voxels, and points on walls and bones of the coarse fits by which a larger motion is looked for: they see 5
+voxels and more, in a thirtieth of SimpleITK's time."""
+AGREES_VOXELS = 0.5
+"""How far from there the fine fit may end, to be believed: where both are right they are 0.1 voxel apart."""
 WALL_POINTS = 200
 """Fewer points show no motion."""
 BAND_VOXELS = 2.0
@@ -62,6 +68,12 @@ class Anchor:
     def structures(self) -> StaticPoints:
         """Points on walls and bones, for the fit of a frame that moved."""
         return static_points(self.reference, _thinned(self.reference, self.edges, STRUCTURE_POINTS), self.patch_mm)
+
+    @cached_property
+    def coarse(self) -> list[StaticPoints]:
+        """The same for COARSE fits, the most blurred first; one gain for all of each."""
+        points = [(_thinned(self.reference, self.edges, count), blur) for blur, count in COARSE]
+        return [static_points(self.reference, at, self.patch_mm, blur).in_one for at, blur in points]
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,11 +150,17 @@ def anchor(reference: Volume, lumen: Lumen) -> Anchor:
 
 
 def _best(frame: Volume, to: Anchor) -> Motion:
-    """The motion by least squares, which starts from SimpleITK's result where the motion is too large for it alone."""
+    """The motion by least squares, from rest, from coarse fits that are borne out, or from SimpleITK's result."""
     structures = to.structures.in_one
     near = fit_motion(frame, structures)
     if near.misfit_voxels < BAD_MISFIT_VOXELS and farthest(near.motion, to.wall) < NEAR_VOXELS:
         return near.motion
+    rough = Motion()
+    for blurred in to.coarse:
+        rough = fit_motion(frame, blurred, rough).motion
+    far = fit_motion(frame, structures, rough)
+    if far.misfit_voxels < BAD_MISFIT_VOXELS and farthest(far.motion.after(rough), to.wall) < AGREES_VOXELS:
+        return far.motion
     rough = rigid(frame, to.reference, to.edges, to.wall.centre_mm)
     far = fit_motion(frame, structures, rough)
     return near.motion if near.misfit_voxels < CLEARLY * far.misfit_voxels else far.motion

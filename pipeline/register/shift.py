@@ -146,20 +146,22 @@ def inside(scan: Volume, points_mm: Array) -> NDArray[np.bool_]:
     return np.asarray(np.all((index > BORDER_VOXELS) & (index < np.array(scan.shape) - 1 - BORDER_VOXELS), axis=1))
 
 
-def static_points(reference: Volume, points_mm: Array, patch_mm: float) -> StaticPoints:
+def static_points(
+    reference: Volume, points_mm: Array, patch_mm: float, blur_voxels: float = BLUR_VOXELS
+) -> StaticPoints:
     """Read the reference at the points (n, 3) that lie well inside it; patch_mm : extent of two patches."""
     points = points_mm[inside(reference, points_mm)]
     order, starts = parted(points, patch_mm)
     points = np.ascontiguousarray(points[order])
     grid, _ = in_memory_order(reference)
     voxel = float(np.min(grid.spacing_mm))
-    field = Blurred(grid.values, grid.spacing_mm, BLUR_VOXELS * voxel)
+    field = Blurred(grid.values, grid.spacing_mm, blur_voxels * voxel)
     jets = jets_at(field, grid.to_index(points) * grid.spacing_mm)
     anywhere = unflattened(np.arange(0, grid.values.size, 1 + grid.values.size // FLAT_POINTS), grid.shape)
     steep = np.sum(jets_at(field, anywhere * grid.spacing_mm)[:, 1:4] ** 2, axis=1)
     steep = steep[steep > 1e-12 * max(float(steep.max()), 1e-12)]  # not the padding around what was reconstructed
     noise = float(np.sqrt(np.quantile(steep, FLAT) / OF_FLAT)) if len(steep) else 0.0
-    return StaticPoints(points, jets[:, 0], jets[:, 1:4] @ grid.direction.T, BLUR_VOXELS * voxel, voxel, noise, starts)
+    return StaticPoints(points, jets[:, 0], jets[:, 1:4] @ grid.direction.T, blur_voxels * voxel, voxel, noise, starts)
 
 
 def _seen(normal: Array, right: Array, least: float) -> Array:

@@ -102,6 +102,15 @@ def test_contrast_that_drifts_is_no_motion(study: Study, fixed: Anchor) -> None:
     assert not register(fainter, fixed, SKIP).applied
 
 
+def test_a_motion_of_some_voxels_needs_no_slow_search(
+    study: Study, fixed: Anchor, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """SimpleITK's took 2.9 s for each frame of 256 voxels, and 0.9 of the run."""
+    monkeypatch.setattr("pipeline.register.rigid", None)
+    true = a_motion(fixed.wall.centre_mm, 4.0, 1.5, seed=140)
+    assert off_by(register(scanned(study, true), fixed, SKIP).motion, true, fixed.wall.points_mm) < 0.1
+
+
 def test_registration_is_deterministic_and_found_by_simpleitk_alone(study: Study, fixed: Anchor) -> None:
     true = a_motion(fixed.wall.centre_mm, 3.0, 1.0, seed=105)
     frame = scanned(study, true)
