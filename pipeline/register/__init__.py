@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from pipeline.arrays.grids import unflattened
 from pipeline.model import Array, Lumen, Volume
 from pipeline.register.bent import Bent, bent
+from pipeline.register.padding import unpadded
 from pipeline.register.patches import LEAST_MM, SPAN_RADII
 from pipeline.register.rigid import Motion, edge_mask, rigid
 from pipeline.register.shift import Fit, StaticPoints, farthest, fit_motion, look, static_points
@@ -142,7 +143,7 @@ def _thinned(grid: Grid, mask: NDArray[np.bool_], count: int) -> Array:
 
 def anchor(reference: Volume, lumen: Lumen) -> Anchor:
     """The wire-free scan prepared once for all frames; ``reference`` may be the crop that holds the lumen."""
-    distance = lumen.distance
+    distance, reference = lumen.distance, unpadded(reference)
     reach = BAND_VOXELS * float(np.min(distance.spacing_mm))
     band = (distance.values < reach) & (distance.values > -reach)  # without a second box of numbers
     patch_mm = max(LEAST_MM, -SPAN_RADII * float(distance.values.min()))
@@ -172,19 +173,27 @@ def _still(wall: StaticPoints, fit: Fit, moved: float) -> Registration:
     return Registration(moved_voxels=moved, left_voxels=moved, misfit_voxels=fit.misfit_voxels, bent=rest)
 
 
+def _in_no_place(frame: Volume, to: Anchor, moved: float, left: float, fit: Fit) -> Registration:
+    """Walls that lie in no place known, with what noise alone makes of their misfit."""
+    noise = to.wall.noise_voxels(static_points(frame, to.wall.points_mm, to.patch_mm).noise)
+    return Registration(moved_voxels=moved, left_voxels=left, misfit_voxels=fit.misfit_voxels, noise_voxels=noise)
+
+
 def register(frame: Volume, to: Anchor, skip_voxels: float) -> Registration:
     """Where the phantom lies in ``frame`` (on the reference's lattice).
 
     A motion below ``skip_voxels`` everywhere on the wall is measured and reported but not applied; nor is one after
     which the walls still do not fit (not ``trusted``).
     """
-    wall = to.wall
+    wall, frame = to.wall, unpadded(frame)
     if len(wall.points_mm) < WALL_POINTS:
         return Registration(misfit_voxels=float("inf"))
     first, _ = look(frame, wall, Motion(), skip_voxels)
     moved = farthest(first.motion, wall)
     if moved < skip_voxels and first.misfit_voxels < BAD_MISFIT_VOXELS:
         return _still(wall, first, moved)
+    if len(to.structures.points_mm) < WALL_POINTS:
+        return _in_no_place(frame, to, moved, moved, first)
     motion, structures = _best(frame, to), to.structures.in_one
     if look(frame, wall, motion)[1]:
         structures = to.structures
@@ -193,8 +202,7 @@ def register(frame: Volume, to: Anchor, skip_voxels: float) -> Registration:
     last, _ = look(frame, wall, motion)
     left = farthest(last.motion.after(motion), wall)
     if last.misfit_voxels > BAD_MISFIT_VOXELS:
-        noise = wall.noise_voxels(static_points(frame, wall.points_mm, to.patch_mm).noise)
-        return Registration(moved_voxels=moved, left_voxels=left, misfit_voxels=last.misfit_voxels, noise_voxels=noise)
+        return _in_no_place(frame, to, moved, left, last)
     if (far := farthest(motion, wall)) < skip_voxels:
         return _still(wall, look(frame, wall, Motion())[0], far)
     shift, loose_mm, rest = motion.displacement_mm(wall.centre_mm), loose * wall.voxel_mm, bent(wall, last.last)

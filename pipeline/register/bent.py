@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 
 from pipeline.arrays.grids import MAD
 from pipeline.model import Array
-from pipeline.register.patches import PATCH_POINTS, means, products, shaded, spread_out
+from pipeline.register.patches import PATCH_POINTS, TINY, means, products, shaded, spread_out
 from pipeline.register.shift import METAL_SCALES, METAL_VOXELS, TUKEY, Solved, StaticPoints, near_metal
 
 ROUNDS = 2
@@ -117,7 +117,7 @@ def _shifts(s: StaticPoints, gain: Array, grey: Array, used: NDArray[np.bool_]) 
         shift = _shown(normal, right)
         shades = np.einsum("kij,kj->ki", shade, np.column_stack([-shift, np.ones(len(shift))]))
         residual = grey - np.sum(design * spread_out(shift, s.starts, count), axis=1) - s.shade(shades)
-        scale = MAD * float(np.median(np.abs(residual[used]))) + 1e-9
+        scale = MAD * float(np.median(np.abs(residual[used]))) + TINY
         weights = used * np.clip(1.0 - (residual / (TUKEY * scale)) ** 2, 0.0, None) ** 2
     return shift, np.add.reduceat(weights, s.starts) > 0.5 * PATCH_POINTS
 
@@ -126,5 +126,5 @@ def _shown(normal: Array, right: Array) -> Array:
     """Solve each patch's equations (k, 3, 3) and (k, 3); shifts that do not show stay zero."""
     power, axes = np.linalg.eigh(normal)
     amounts = np.einsum("kij,ki->kj", axes, right)
-    amounts = np.where(power > ACROSS * power[:, -1:], amounts / np.maximum(power, 1e-12), 0.0)
+    amounts = np.where(power > ACROSS * power[:, -1:], amounts / np.maximum(power, TINY), 0.0)
     return np.asarray(np.einsum("kij,kj->ki", axes, amounts))

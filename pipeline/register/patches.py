@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 from pipeline.model import Array
 
+TINY = 1e-18
+"""A grey that no scan's noise is below, in place of 0 where something is divided by it: some scans are in 1e-7."""
 PATCH_POINTS = 60
 """Points of a patch: five numbers are found from them."""
 LEAST_MM = 5.0
@@ -64,7 +66,9 @@ def shaded(squares: Array) -> tuple[Array, Array, Array]:
     m = squares.shape[1] - 3
     others = [*range(m), m + 2]
     own, cross = squares[:, m : m + 2, m : m + 2], squares[:, m : m + 2][:, :, others]
-    ridge = 1e-9 * np.trace(own, axis1=1, axis2=2) + 1e-12
-    solved = np.linalg.solve(own + ridge[:, None, None] * np.eye(2), cross)
+    # each by its own size: as a share of both, one of a scan of large greys held the offset back
+    size = np.diagonal(own, axis1=1, axis2=2)
+    ridge = np.where(size > 0.0, 1e-9 * size, 1.0)
+    solved = np.asarray(np.linalg.solve(own + ridge[:, :, None] * np.eye(2), cross), np.float64)
     left = squares[:, :m][:, :, others] - np.swapaxes(cross[:, :, :m], 1, 2) @ solved
     return left[:, :, :m], left[:, :, m], solved

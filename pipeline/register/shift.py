@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 from pipeline.arrays.grids import MAD, in_memory_order, unflattened
 from pipeline.arrays.jets import Blurred, jets_at, values_at
 from pipeline.model import Array, Volume
-from pipeline.register.patches import means, parted, products, shaded, spread_out
+from pipeline.register.patches import TINY, means, parted, products, shaded, spread_out
 from pipeline.register.rigid import Motion
 
 BLUR_VOXELS = 1.0
@@ -112,7 +112,7 @@ class StaticPoints:
         voxel it was within 15 %.
         """
         both = float(np.hypot(self.noise, of_frame))
-        return float(np.sqrt(2.0)) * both * self.blur_mm / max(self.voxel_mm * self.steepness, 1e-9)
+        return float(np.sqrt(2.0)) * both * self.blur_mm / max(self.voxel_mm * self.steepness, TINY)
 
 
 class Solved(NamedTuple):
@@ -159,7 +159,7 @@ def static_points(
     jets = jets_at(field, grid.to_index(points) * grid.spacing_mm)
     anywhere = unflattened(np.arange(0, grid.values.size, 1 + grid.values.size // FLAT_POINTS), grid.shape)
     steep = np.sum(jets_at(field, anywhere * grid.spacing_mm)[:, 1:4] ** 2, axis=1)
-    steep = steep[steep > 1e-12 * max(float(steep.max()), 1e-12)]  # not the padding around what was reconstructed
+    steep = steep[steep > 1e-12 * float(steep.max(initial=0.0))]  # not the padding around what was reconstructed
     noise = float(np.sqrt(np.quantile(steep, FLAT) / OF_FLAT)) if len(steep) else 0.0
     return StaticPoints(points, jets[:, 0], jets[:, 1:4] @ grid.direction.T, blur_voxels * voxel, voxel, noise, starts)
 
@@ -182,7 +182,7 @@ def _reweighted(s: StaticPoints, design: Array, grey: Array, used: NDArray[np.bo
         shades = shade @ np.append(-solution, 1.0)
         change = design @ solution
         residual = grey - change - s.shade(shades)
-        scale = MAD * float(np.median(np.abs(residual[used]))) + 1e-9
+        scale = MAD * float(np.median(np.abs(residual[used]))) + TINY
         weights = used * np.clip(1.0 - (residual / (TUKEY * scale)) ** 2, 0.0, None) ** 2
     return Solved(solution, change, shades[:, 1], residual, scale, used)
 
@@ -226,7 +226,7 @@ def _step(s: StaticPoints, at_mm: Array, grey: Array, motion: Motion) -> Fit:
     if MOST_METAL * len(grey) < np.count_nonzero(clear) < len(grey):
         found = _reweighted(s, design, grey, clear)
     shown = LEAST_GAIN < np.median(found.gains) < 1.0 / LEAST_GAIN
-    misfit = found.scale / max(h * s.steepness, 1e-9) if shown else float("inf")
+    misfit = found.scale / max(h * s.steepness, TINY) if shown else float("inf")
     return Fit(moved_by(motion, s, found.amounts), misfit, found._replace(clear=clear))
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from pipeline.arrays.grids import spread
 from pipeline.model import Array, Volume
-from pipeline.register.patches import products, shaded
+from pipeline.register.patches import TINY, products, shaded
 from pipeline.register.rigid import Motion
 from pipeline.register.shift import (
     ABOVE_NOISE,
@@ -92,7 +92,7 @@ def _best_along(frame: Volume, s: StaticPoints, motion: Motion, axis: Array) -> 
         return motion, 0.0
     rest = np.stack([_rest(frame, s, one, seen) for one in motions])
     here = len(rest) // 2
-    scale = max(spread(rest[here]), 1e-9)  # a scan without noise
+    scale = max(spread(rest[here]), TINY)  # a scan without noise
     metal = np.min(rest, axis=0) > METAL_SCALES * scale
     clear = ~near_metal(s.points_mm[seen], metal, METAL_VOXELS * s.voxel_mm)
     square = np.minimum(np.abs(rest[:, clear]) / scale, CUT) ** 2

@@ -111,6 +111,36 @@ def test_a_motion_of_some_voxels_needs_no_slow_search(
     assert off_by(register(scanned(study, true), fixed, SKIP).motion, true, fixed.wall.points_mm) < 0.1
 
 
+def changed(scan: Volume, scale: float, rim: float | None) -> Volume:
+    """The scan in other units, with -1024 beyond a share ``rim`` of its half width: there the scanner sees nothing."""
+    values = scale * np.asarray(scan.values, np.float32)
+    if rim is not None:
+        x, y = (np.linspace(-1.0, 1.0, n) for n in scan.shape[:2])
+        values[np.hypot(x[:, None], y) > rim] = -1024.0
+    return replace(scan, values=values.astype(np.float32))
+
+
+@pytest.mark.parametrize(("scale", "rim"), [(1.0, 0.7), (1.0, 0.85), (100.0, None), (1e4, None), (1e-7, None)])
+def test_neither_padding_nor_the_unit_of_grey_moves_a_phantom(
+    study: Study, lumen: Lumen, scale: float, rim: float | None
+) -> None:
+    """Padding held it in its place, or slid it by 2.4 mm; of greys of 1e5 and of 1e-5 no motion was found."""
+    to = anchor(changed(volume(study, study.reference), scale, rim), lumen)
+    true = a_motion(to.wall.centre_mm, 1.7, 0.5, seed=150)
+    found = register(changed(scanned(study, true), scale, rim), to, SKIP)
+    assert found.applied
+    assert off_by(found.motion, true, to.wall.points_mm) < 0.1
+
+
+def test_a_vessel_that_no_scan_shows_is_seen_in_no_place(study: Study, lumen: Lumen) -> None:
+    """An own lumen of a phantom that is not filled: no point on a wall, and an IndexError."""
+    blank = [np.random.default_rng(n).normal(100.0, 20.0, study.grid.shape).astype(np.int16) for n in range(2)]
+    found = register(volume(study, blank[0]), anchor(volume(study, blank[1]), lumen), SKIP)
+    assert not found.trusted
+    assert not found.applied
+    assert "none is seen where the lumen has it" in found.sentence
+
+
 def test_registration_is_deterministic_and_found_by_simpleitk_alone(study: Study, fixed: Anchor) -> None:
     true = a_motion(fixed.wall.centre_mm, 3.0, 1.0, seed=105)
     frame = scanned(study, true)
