@@ -118,6 +118,11 @@ def unflattened(flat: NDArray[np.int64], shape: tuple[int, ...]) -> NDArray[np.i
     return np.stack(np.unravel_index(flat, shape), axis=1)
 
 
+def spelt(place: Array, digits: int = 1) -> str:
+    """Coordinates (3,) in a sentence, without a minus before a zero."""
+    return ", ".join(f"{x:.{digits}f}" for x in np.round(np.asarray(place, float), digits) + 0.0)
+
+
 def spread(values: NDArray[Any]) -> float:
     """Standard deviation of normal noise, from the median absolute deviation, which outliers hardly change.
 

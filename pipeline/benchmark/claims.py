@@ -81,10 +81,10 @@ def step_time() -> Iterator[Claim]:
     yield Claim("time(800 joints) / time(400 joints)", ratio, "1", "at most 2.3", ratio <= 2.3, timed=True)
 
 
-def _last_steps(scene: BenchScene, wall: VesselWall | None, segment_mm: float, steps: int = 20) -> float:
-    """Median seconds of one of the last steps into the scene."""
+def _last_steps(scene: BenchScene, wall: VesselWall | None, segment_mm: float) -> float:
+    """Median seconds of one of the last 20 steps of 1 mm into the scene."""
     insertion = Insertion(scene.wire(segment_mm), wall, scene.entry_mm, scene.direction)
-    depths = np.linspace(scene.depth_mm - steps, scene.depth_mm, steps + 1)
+    depths = np.linspace(scene.depth_mm - 20.0, scene.depth_mm, 21)
     list(insertion.to_depths([*range(5, int(depths[0]), 5), float(depths[0])]))
     pushes = insertion.to_depths(depths[1:])
     return float(np.median([timed(partial(next, pushes), 1)[0] for _ in depths[1:]]))

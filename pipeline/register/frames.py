@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.arrays.grids import sampled
+from pipeline.arrays.grids import sampled, spelt
 from pipeline.model import Curve, Lumen, Volume
 from pipeline.register import Anchor, Registration, anchor, register
 from pipeline.register.bent import Bent
@@ -101,7 +101,7 @@ def _bent(found: Sequence[tuple[int, Bent]]) -> list[str]:
     if not found:
         return []
     number, worst = max(found, key=lambda pair: pair[1].rms_voxels)
-    place = ", ".join(f"{x:.1f}" for x in worst.worst_mm)
+    place = spelt(worst.worst_mm)
     return [
         f"{frames_named([n for n, _ in found])}: the vessel's wall fits no rigid motion of the phantom, up to "
         f"{worst.rms_voxels:.2f} voxel rms are left (frame {number}, {worst.most_voxels:.2f} at LPS mm ({place})): it "

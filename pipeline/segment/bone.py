@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from pipeline.arrays.grids import indices_of
+from pipeline.arrays.grids import indices_of, spelt
 from pipeline.segment.contact import Contact, how_many, named
 from pipeline.segment.groups import two_groups
 from pipeline.segment.levels import BRIGHTER, GreyLevels, Index, box_from, grey_around
@@ -87,7 +87,7 @@ def two_greys(scan: Grid, distance: Grid, corner: Index, levels: GreyLevels, blu
     bright, low, high, apart = two_groups(grey)
     if not high - low >= max(GAP, apart):
         return ()
-    at = [round(float(x), 1) for x in distance.to_mm(np.median(deep[bright], axis=0))]
+    at = f"[{spelt(distance.to_mm(np.median(deep[bright], axis=0)))}]"
     share, more = 100 * np.mean(bright), 100 * (high / low - 1)
     return (
         f"segment: the vessel has two greys: {share:.0f} % of its depth are {more:.0f} % brighter than the rest, at "

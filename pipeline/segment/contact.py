@@ -15,7 +15,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from pipeline.arrays.grids import unflattened
+from pipeline.arrays.grids import spelt, unflattened
 from pipeline.arrays.lattice import sparse_zeros
 from pipeline.segment._kernels.contact import Cores, Inner, along_cores, meetings, nearest_core, runs_on, thickness
 from pipeline.segment._kernels.voxels import rebased
@@ -61,7 +61,7 @@ def how_many(places: Sequence[object]) -> str:
 def named(places: Sequence[Contact]) -> str:
     """The largest places in words, each with its area."""
     largest = sorted(places, key=lambda c: -c.area_mm2)[:MOST_NAMED]
-    return ", ".join(f"{[float(round(x, 1)) for x in c.place_mm]} mm ({c.area_mm2:.1f} mm²)" for c in largest)
+    return ", ".join(f"[{spelt(c.place_mm)}] mm ({c.area_mm2:.1f} mm²)" for c in largest)
 
 
 def warning(places: tuple[Contact, ...]) -> tuple[str, ...]:

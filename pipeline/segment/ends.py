@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from pipeline.arrays.grids import spelt
 from pipeline.arrays.jets import smooth_voxels
 from pipeline.arrays.polyline import across
 from pipeline.segment.levels import BRIGHTER, GreyLevels, Index
@@ -209,7 +210,7 @@ def ends(
 
 def _said(place_mm: Array, gap_mm: float) -> str:
     """What the report says of an end."""
-    where = ", ".join(f"{x:.1f}" for x in place_mm)
+    where = spelt(place_mm)
     return (
         f"segment: the lumen ends inside the scan at {where} mm, as wide as before, and something as wide and bright "
         f"goes on {gap_mm:.1f} mm ahead: a dark band (beside metal, say) may cut the vessel, and what lies beyond is "

@@ -5,7 +5,7 @@ It faces up, whatever the way of the vessel, and what lies beyond it has nothing
 
 import numpy as np
 
-from pipeline.arrays.grids import normals_at
+from pipeline.arrays.grids import normals_at, spelt
 from solver.grid import Grid
 
 NEAR_VOXELS, LOOKED_AT, TRIED = 0.6, 4000, 300
@@ -31,7 +31,7 @@ def flat_side(distance: Grid) -> tuple[str, ...]:
     best = int(np.argmax(share))
     if not share[best] > max(LEAST, TIMES * float(opposite[best])):
         return ()
-    way = ", ".join(f"{x:.2f}" for x in tried[best])
+    way = spelt(tried[best], 2)
     return (
         f"segment: {100 * share[best]:.0f} % of the vessel's wall is flat and faces one way, LPS ({way}): where that "
         "is up, the contrast medium may fill the vessel in part, and the lumen is that part; or the scan's edge cuts "

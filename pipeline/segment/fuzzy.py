@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pipeline.arrays.grids import unflattened
+from pipeline.arrays.grids import spelt, unflattened
 from pipeline.segment import valley
 from pipeline.segment._kernels.connect import Affinity
 from pipeline.segment.around_seed import levels_at
@@ -38,7 +38,7 @@ given, its own scans were traced to 0.02 mm, with a reference and without."""
 def _at(grid: Grid, seeds: Index) -> str:
     """Where the seeds lie, and the grey there: a seed beside the vessel is what most often goes wrong."""
     said = [
-        f"{place.round(1).tolist()} mm (LPS), grey {grid.values[tuple(seed)]:.0f}"
+        f"[{spelt(place)}] mm (LPS), grey {grid.values[tuple(seed)]:.0f}"
         for place, seed in zip(grid.to_mm(seeds), seeds, strict=True)
     ]
     return f"; the seed is at {' and '.join(said[:3])}"

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.ndimage import label
 
-from pipeline.segment.pieces import spelt
+from pipeline.arrays.grids import spelt
 from solver.grid import Grid
 
 LEAST_VOXELS = 8
@@ -24,6 +24,6 @@ def hollows(distance: Grid) -> list[str]:
     volume, many = sizes[largest] * float(np.prod(distance.spacing_mm)), int((sizes >= LEAST_VOXELS).sum())
     what = f"the given lumen has {many} hollow{'s' * (many > 1)} inside it, and no simulated wire passes there"
     return [
-        f"segment: {what}: the largest is {volume:.1f} mm³ at {spelt(middle)} mm; was a wire, air or calcium left "
+        f"segment: {what}: the largest is {volume:.1f} mm³ at [{spelt(middle)}] mm; was a wire, air or calcium left "
         "out of it, or does a surface lie within another? Fill it in the file"
     ]

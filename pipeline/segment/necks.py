@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from pipeline.arrays.grids import unflattened
+from pipeline.arrays.grids import spelt, unflattened
 from pipeline.arrays.jets import Blurred, smooth_voxels, values_at
 from pipeline.arrays.lattice import sparse_zeros
 from pipeline.arrays.polyline import across
@@ -213,7 +213,7 @@ def add_necks(
 
 def _said(place_mm: Array, radius_mm: float) -> str:
     """What the report says of a neck."""
-    where = ", ".join(f"{x:.1f}" for x in place_mm)
+    where = spelt(place_mm)
     return (
         f"segment: the vessel narrows to a radius of about {radius_mm:.2f} mm at {where} mm, too thin for a wall; it "
         "was followed to what lies straight behind: look whether this is one vessel, or give the lumen as a file "

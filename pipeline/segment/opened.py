@@ -6,11 +6,11 @@ from dataclasses import replace
 import numpy as np
 from scipy.ndimage import map_coordinates
 
-from pipeline.arrays.grids import in_memory_order, reorder
+from pipeline.arrays.grids import in_memory_order, reorder, spelt
 from pipeline.model import Array, Curve, Lumen
 from pipeline.segment._kernels.solids import cones
 from pipeline.segment.contact import how_many
-from pipeline.segment.pieces import Gap, between_pieces, crossed, spelt
+from pipeline.segment.pieces import Gap, between_pieces, crossed
 from solver.grid import Grid, read_only
 
 OUTSIDE_VOXELS = 1.0
@@ -105,7 +105,7 @@ def _told(said: Sequence[Place], allowed: float) -> str:
     deepest, place = max(said, key=lambda one: one[0])
     return (
         f"segment: traced wires ran up to {deepest:.2f} mm outside the lumen in {how_many(said)}, allowed "
-        f"{allowed:.2f} and {SIGMAS:g} standard deviations; furthest at {spelt(place)} mm"
+        f"{allowed:.2f} and {SIGMAS:g} standard deviations; furthest at [{spelt(place)}] mm"
     )
 
 

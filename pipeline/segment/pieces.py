@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import label, map_coordinates
 from scipy.spatial import cKDTree
 
-from pipeline.arrays.grids import indices_of
+from pipeline.arrays.grids import indices_of, spelt
 from pipeline.model import Array, Curve
 from solver.grid import Grid
 
@@ -60,7 +60,7 @@ def in_pieces(distance: Grid, entry_mm: ArrayLike) -> list[str]:
     return [
         f"segment: the given lumen is in {count} pieces, and no simulated wire goes from one to another: one begins "
         f"{apart[closest]:.1f} mm (between the middles of voxels) from that which the wire enters, near "
-        f"{spelt(middle)} mm; is a slice missing there, or a part of the surface, or do two surfaces overlap? Close "
+        f"[{spelt(middle)}] mm; is a slice missing there, or a part of the surface, or do two surfaces overlap? Close "
         "the gap, or unite them, in the file"
     ]
 
@@ -97,7 +97,7 @@ def crossed(gaps: Sequence[Gap]) -> str:
     times = f"{len(gaps)} time{'s' * (len(gaps) != 1)}"
     return (
         f"segment: traced wires run from one piece of the given lumen to another, {times}, over at most "
-        f"{longest.long_mm:.2f} mm; furthest at {spelt(longest.middle_mm)} mm"
+        f"{longest.long_mm:.2f} mm; furthest at [{spelt(longest.middle_mm)}] mm"
     )
 
 
@@ -105,8 +105,3 @@ def _pieces(distance: Grid) -> NDArray[np.int32]:
     """The number, from 1 up, of the piece that each voxel is in; 0 outside. Voxels of a piece share faces."""
     numbers: NDArray[np.int32] = np.asarray(label(distance.values < 0.0)[0], dtype=np.int32)
     return numbers
-
-
-def spelt(place: Array) -> str:
-    """A place (3,), mm, to a tenth."""
-    return "[" + ", ".join(f"{x:.1f}" for x in place) + "]"

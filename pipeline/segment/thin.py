@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from pipeline.arrays.grids import indices_of
+from pipeline.arrays.grids import indices_of, spelt
 from pipeline.arrays.jets import Blurred, smooth_voxels
 from pipeline.arrays.lattice import sparse_zeros
 from pipeline.segment._kernels.connect import FULL as FULL_STRENGTH
@@ -155,7 +155,7 @@ def warning(grid: Grid, faint: Sequence[Index]) -> tuple[str, ...]:
     """One sentence for the report on branches that are filled too little, or none. faint : a voxel of each."""
     if not faint:
         return ()
-    place, count = grid.to_mm(faint[0]).round(1).tolist(), len(faint)
+    place, count = f"[{spelt(grid.to_mm(faint[0]))}]", len(faint)
     many = f"{count} things like branches are" if count > 1 else "something like a branch is"
     return (
         f"segment: {many} too faint for the wall's level, half of the vessel's contrast, and left out of the lumen "

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from skimage.measure import label
 
-from pipeline.arrays.grids import unflattened
+from pipeline.arrays.grids import spelt, unflattened
 from pipeline.arrays.jets import smooth_voxels
 from pipeline.segment.levels import Index, Region
 from pipeline.segment.thin import SKIRT
@@ -72,8 +72,8 @@ def warning(grid: Grid, passing: Sequence[Index]) -> tuple[str, ...]:
     """One sentence for the report on the thin vessels that pass by, or none. passing : where they do, voxels."""
     if not passing:
         return ()
-    place, count = grid.to_mm(passing[0]).round(1).tolist(), len(passing)
-    first = f"the first at {place} mm" if count > 1 else f"at {place} mm"
+    place, count = f"at [{spelt(grid.to_mm(passing[0]))}] mm", len(passing)
+    first = f"the first {place}" if count > 1 else place
     return (
         f"segment: {count} thin vessel{'s' * (count > 1)} beside the lumen {'are' if count > 1 else 'is'} taken for no "
         f"branch of it, as the grey falls between them ({first}); look at the picture; if this is a branch, give the "

@@ -80,8 +80,8 @@ def trace(
     voxel = float(np.min(frame.spacing_mm))
     larger, ok = times(frame), curve.status is FrameStatus.OK
     if larger > 1 and (not ok or curve.levels.get("blur_mm", 0.0) > THICK_VOXELS * voxel):
-        scans = coarse_scan(frame, larger), reference and coarse_scan(reference, larger), coarse_lumen(lumen, larger)
-        again = _seen(scans, stated, previous, config)
+        seen, empty = coarse_scan(frame, larger), reference and coarse_scan(reference, larger)
+        again = _seen((seen, empty, coarse_lumen(lumen, larger * voxel)), stated, previous, config)
         if again.status is FrameStatus.OK and not (ok and _same(again, curve, voxel, 1.0)):
             curve = again
     if len(curve.points_mm) == 0:

@@ -40,8 +40,11 @@ def coarse_scan(scan: Volume, n: int) -> Volume:
     return _of_scan[scan][1]
 
 
-def coarse_lumen(lumen: Lumen, n: int) -> Lumen:
-    """The lumen on voxels n times as large."""
+def coarse_lumen(lumen: Lumen, voxel_mm: float) -> Lumen:
+    """The lumen on voxels of about that size; itself where its own, which need not be the scan's, are as large."""
+    n = max(1, round(voxel_mm / float(np.min(lumen.distance.spacing_mm))))
+    if n == 1:
+        return lumen
     if lumen not in _of_lumen or _of_lumen[lumen][0] != n:
         _of_lumen[lumen] = n, replace(lumen, distance=_means(lumen.distance, n))
     return _of_lumen[lumen][1]

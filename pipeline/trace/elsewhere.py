@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from pipeline.arrays.grids import sampled, spread
+from pipeline.arrays.grids import sampled, spelt, spread
 from pipeline.model import Array, Volume
 from solver.grid import Grid
 
@@ -35,8 +35,7 @@ class Line(NamedTuple):
 
     def __str__(self) -> str:
         """A hint for the user on where the entry belongs."""
-        place = ", ".join(f"{mm:.1f}" for mm in self.nearest_mm)
-        where = f"passes {self.distance_mm:.1f} mm from entry_mm, at [{place}] mm (LPS)"
+        where = f"passes {self.distance_mm:.1f} mm from entry_mm, at [{spelt(self.nearest_mm)}] mm (LPS)"
         return f"the brightest line near it {where}: if that is the wire, entry_mm belongs on it"
 
 

@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from pipeline.arrays.grids import spelt
 from pipeline.arrays.polyline import turns_deg
 from pipeline.model import Array
 from pipeline.status import FrameStatus
@@ -64,7 +65,7 @@ def sharpest_turn_deg(points: Array, step: float, reach: float) -> float:
 
 def named(image: Subtraction, point: Array) -> str:
     """A place in LPS mm, for a message."""
-    return ", ".join(f"{x:.1f}" for x in image.world(point[None])[0])
+    return spelt(image.world(point[None])[0])
 
 
 def _at_edge(image: Subtraction, points: Array) -> bool:

@@ -178,7 +178,8 @@ def extended(points: Array, ahead: float, step: float) -> Array:
     back = int(np.searchsorted(arc, arc[-1] - min(1.5, 0.5 * arc[-1])))
     t = points[-1] - points[min(back, len(points) - 2)]
     t /= np.linalg.norm(t)
-    more = np.arange(step, ahead + step, step)[:, None] * t
+    # counted, as rounding of the end makes np.arange(step, ahead + step, step) one longer
+    more = step * np.arange(1, round(ahead / step) + 1)[:, None] * t
     return np.concatenate([points, points[-1] + more])
 
 

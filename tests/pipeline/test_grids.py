@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pipeline.arrays.grids import spread
+from pipeline.arrays.grids import spelt, spread
 
 
 @pytest.mark.parametrize("noise", [0.6, 0.9, 1.28, 1.92, 2.56, 4.0])
@@ -18,3 +18,8 @@ def test_noise_of_whole_greys_is_told_as_it_is(noise: float) -> None:
 def test_nothing_is_no_noise() -> None:
     """Greys that are all the same."""
     assert spread(np.full(100, 7)) == 0.0
+
+
+def test_a_place_is_spelt_without_a_minus_before_a_zero() -> None:
+    assert spelt(np.array([-0.04, 12.25, -3.0])) == "0.0, 12.2, -3.0"
+    assert spelt(np.array([-0.04, 0.004, 1.0]), 2) == "-0.04, 0.00, 1.00"

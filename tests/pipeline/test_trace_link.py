@@ -95,6 +95,13 @@ def test_a_path_is_continued_straight_by_what_is_asked():
     np.testing.assert_allclose(longer[-1] / np.linalg.norm(longer[-1]), [0.6, 0.0, 0.8], rtol=0.0, atol=1e-12)
 
 
+@pytest.mark.parametrize("voxel", [0.11, 0.3, 0.42, 0.46, 0.5])
+def test_a_path_is_continued_by_as_many_steps_whatever_the_voxel(voxel):
+    """Of 0.42 mm four voxels were five: what was read there as the wire's end lay a voxel beyond it."""
+    points = np.outer(voxel * np.arange(20.0), [0.6, 0.0, 0.8])
+    assert len(extended(points, 4.0 * voxel, voxel)) == len(points) + 4
+
+
 @pytest.mark.parametrize(("levels", "grey", "counts"), [
     ([1.0], 25.0, True), ([1.0], 15.0, False), ([0.15, 1.0], 15.0, True), ([0.0, 1.0], 15.0, False),
 ])  # fmt: skip

@@ -90,7 +90,7 @@ def _depths(first: float, last: float, count: int, back: float | None = None, fe
 def ways(seed: int) -> list[Way]:
     """Three insertions to calibrate with, six blind ones in two other anatomies."""
     rng = np.random.default_rng([seed, 15])
-    helix, curve = shapes.helix(), shapes.s_curve(turn_mm=10.0)
+    helix, curve = shapes.helix(), shapes.s_curve()
     bend = shapes.bend(angle_deg=110.0, turn_mm=12.0)
     found = [
         Way("c-helix", "calibration", helix, helix.tubes[0], 4.0, _depths(10, 54, 9, 18, 5), 90.0),

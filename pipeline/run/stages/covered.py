@@ -4,6 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from pipeline.arrays.grids import spelt
 from pipeline.arrays.polyline import at_arc, samples
 from pipeline.model import Array, OverWire, arc_length
 from reports.case_files import counted
@@ -34,8 +35,7 @@ def too_thick(what: str, radius_mm: float, lines: Mapping[int, Array], wall: Ves
         worst = int(np.argmin(room))
         count += bool(radius_mm > room[worst] + NARROWER_VOXELS * float(np.max(wall.distance.spacing_mm)))
         if room[worst] < least:
-            place = ", ".join(f"{x:.1f}" for x in points[worst])
-            least, where = float(room[worst]), f"in frame {frame} near [{place}] mm"
+            least, where = float(room[worst]), f"in frame {frame} near [{spelt(points[worst])}] mm"
     if not count:
         return []
     return [

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from pipeline.arrays.grids import spelt
 from pipeline.arrays.polyline import at_arc, resample, samples
 from pipeline.compare.metrics import rms
 from pipeline.load.wires import OtherFile, read_wires, warned_beside
@@ -135,7 +136,7 @@ def _kinked(wires: Mapping[int, Array], wire: Wire) -> list[str]:
         return []
     worst = max(found, key=lambda n: found[n][0])
     angle, place = found[worst]
-    reach, where = quarter_mm(wire.radius_mm), ", ".join(f"{x:.1f}" for x in place)
+    reach, where = quarter_mm(wire.radius_mm), spelt(place)
     return [
         f"{counted(len(found), 'frame')}: wires turn as none of radius_mm = {wire.radius_mm:g} does: in frame {worst} "
         f"by {angle:.0f} degrees within {reach:.1f} mm, near [{where}] mm; is the wire folded there?"
@@ -161,7 +162,7 @@ def _aside(frames: Sequence[Frame]) -> list[str]:
     left, size = rms(np.linalg.norm(every - shift, axis=1)), float(np.linalg.norm(shift))
     if size < LEAST_ASIDE_MM or left > MOST_LEFT * size:
         return []
-    place = ", ".join(f"{x:.1f}" for x in shift.round(1) + 0.0)  # no -0.0
+    place = spelt(shift)
     return [
         f"the wires lie ({place}) mm aside from the traced ones, alike in {counted(len(pairs), 'frame')} (without that "
         f"{left:.2g} mm rms are left): is their origin that of the scans?"
