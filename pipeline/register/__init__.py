@@ -116,8 +116,9 @@ class Registration:
             far = f"misfit {self.misfit_voxels:.1f} voxels, allowed {BAD_MISFIT_VOXELS}"
             seen = far if np.isfinite(self.misfit_voxels) else "none is seen where the lumen has it"
             return (
-                f"no registration applied: the walls fit the reference in no place ({seen}); look at the frame, or set "
-                "trace.register = off"
+                f"no registration applied: the walls fit the reference in no place ({seen}); a phantom that moved is "
+                "not put back, and traces lie off by that: look at the frame, fill the vessel, or hold the phantom in "
+                "its place and set trace.register = off"
             )
         if not self.applied:
             return f"no registration applied: the phantom moved by {self.moved_voxels:.2f} voxel"

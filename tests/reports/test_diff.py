@@ -62,17 +62,18 @@ def test_verdicts(change: dict[str, object], column: str, verdict: str) -> None:
         ("no_wire", "roll_fitted", "better"),
         ("roll_fitted", "no_wire", "regression"),
         ("no_wire", "not_to_depth", "moved"),
+        ("length_mismatch", "length_mismatch", "same"),
         ("ok", "simulated", "regression"),
         ("simulated", "ok", "better"),
     ],
 )
 def test_a_status_is_worse_only_where_that_is_known(was: str, now: str, verdict: str) -> None:
-    """A frame that the roll was fitted on has an error, and no score to be held against another's."""
+    """A frame that the roll was fitted on, or whose trace is refused, has an error that is in no score: gates closed."""
     before, after = _row(status=was, rms_mm=0.1), _row(status=now, rms_mm=None if now == "simulated" else 0.9)
     found = diff.diff_tables({"c": _table([before])}, {"c": _table([after])}, {"rms_mm": 0.1})
     rows = found.rows.set_index("column")
     assert rows.loc["status", "verdict"] == verdict
-    assert ("rms_mm" in rows.index) == ("roll_fitted" not in (was, now) and now != "simulated")
+    assert ("rms_mm" in rows.index) == ((was, now) == ("simulated", "ok"))
 
 
 def test_a_recovered_frame_is_no_regression() -> None:
