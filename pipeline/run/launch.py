@@ -33,7 +33,7 @@ from pipeline.run.workers import NO_LIMITS, Limits
 from pipeline.status import UsageError, did_you_mean
 from pipeline.study.check import frames_of
 from pipeline.study.manifest import Case, Manifest
-from pipeline.study.same_scans import continued
+from pipeline.study.plausible import among
 from pipeline.study.settings import to_toml
 from reports.atomic import WriteError, remove_leftovers, write_text, writing
 from reports.case_files import counted, provenance_of
@@ -166,7 +166,7 @@ def launch(plan: Plan) -> tuple[Totals, Path]:
     heads = heads_of(settings, plan.cases, plan.points)
     info |= {"sweep": heads, "swept": sorted(plan.ids) if heads else [], "until": plan.template.until}
     info |= {"stated": {case.id: stated(case) for case in plan.manifest.cases}}
-    info |= {"planned": [case.id for case in plan.manifest.cases], "doubts": continued(plan.manifest.cases)}
+    info |= {"planned": [case.id for case in plan.manifest.cases], "doubts": among(plan.manifest.cases)}
     info |= {"to_score": {case.id: case.frames_to_score for case in plan.manifest.cases if case.frames_to_score}}
     info |= {"fail_if": [gate.text for gate in plan.gates], **({"own": own} if (own := registered()) else {})}
     # the numbers: 1/02 is the shard 1/2

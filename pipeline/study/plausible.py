@@ -245,7 +245,24 @@ def doubts(cases: Sequence[Case], config: Config) -> Iterator[str]:
             said.setdefault(text, []).append(repr(case.id))
     yield from (f"case{'s' * (len(ids) > 1)} {listed(ids)}: {text}" for text, ids in said.items())
     yield from shared(cases)
-    yield from continued(cases)
+    yield from among(cases)
+
+
+def among(cases: Sequence[Case]) -> list[str]:
+    """What is doubtful of cases among themselves, and belongs on the page of their run."""
+    return [*continued(cases), *_of_two_kinds(cases)]
+
+
+def _of_two_kinds(cases: Sequence[Case]) -> list[str]:
+    """That figures over all cases would be of wires in space and of wires in projections."""
+    scored = [case for case in cases if case.role == "validation" and case.compared]
+    flat = [case.id for case in scored if case.projections is not None]
+    if not 0 < len(flat) < len(scored):
+        return []
+    return [
+        f"{listed(flat)}: distances in projections lack what lies along the rays, about half of a squared error; the "
+        "other cases have distances in space, and figures over all of them mix both: quote each kind alone (--only)"
+    ]
 
 
 MEASURES = "compare.skip_mm", "compare.sample_mm", "compare.simulated_nulls", "trace.length_tolerance_mm"

@@ -20,6 +20,7 @@ from pipeline.study.check import check
 from pipeline.study.devices import implausible
 from pipeline.study.manifest import ManifestError, read_manifest
 from pipeline.study.plausible import (
+    among,
     in_case,
     loose_entry,
     lost_header,
@@ -447,3 +448,12 @@ def test_names_that_look_alike_are_one_or_refused() -> None:
     assert name.validate_python(" A ") == "A"
     with pytest.raises(ValidationError, match="has characters that are not seen"):
         name.validate_python("A\u200b")
+
+
+def test_projections_beside_scans_are_told(tmp_path: Path) -> None:
+    """Distances in a plane and in space were one rms."""
+    (case,) = read_manifest(written(tmp_path, GOOD)).cases
+    flat = case.model_copy(update={"id": "flat", "frames": (), "projections": tmp_path / "p.csv"})
+    assert "flat: distances in projections lack" in among([case, flat])[0]
+    assert not among([case, case])
+    assert not among([flat, flat])

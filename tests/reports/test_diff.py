@@ -68,7 +68,7 @@ def test_verdicts(change: dict[str, object], column: str, verdict: str) -> None:
     ],
 )
 def test_a_status_is_worse_only_where_that_is_known(was: str, now: str, verdict: str) -> None:
-    """A frame that the roll was fitted on, or whose trace is refused, has an error that is in no score: gates closed."""
+    """A frame that the roll was fitted on, or whose trace is refused, has an error that is in no score."""
     before, after = _row(status=was, rms_mm=0.1), _row(status=now, rms_mm=None if now == "simulated" else 0.9)
     found = diff.diff_tables({"c": _table([before])}, {"c": _table([after])}, {"rms_mm": 0.1})
     rows = found.rows.set_index("column")
