@@ -36,7 +36,7 @@ class FrameStatus(Enum):
     )
     UNDER_RESOLVED = (
         "a joint of the simulated wire is turned by more than 30 degrees: its segments are too long for this bend; "
-        "set a shorter solver.segment_mm, or auto"
+        "set a shorter solver.segment_mm, or auto where a length is set"
     )
     SELF_CONTACT = (
         "the simulated wire passes through itself, or did on its way here, as its parts do not push each other in this "

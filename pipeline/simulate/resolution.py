@@ -75,11 +75,14 @@ def resolve(insert: Insert, lengths: Sequence[float]) -> Resolved:
     # the first length only serves for comparison: where it snaps aside, the next pair of lengths is needed, too
     segment, wires = lengths[0], insert(lengths[0], len(lengths) == 1)
     num = push = np.full(len(wires), np.nan)
+    refined = len(lengths) == 1
     reason, before = "no coarser segments can follow the wire's rest curvature: no estimate of their error", wires
     for shorter in lengths[1:]:
         finer = insert(shorter, True)
         moved, pushed = _moved(before, finer)
         before = finer
+        if len(lengths) > 2 and _reached(finer) < _reached(wires) and not refined:
+            wires, refined = insert(segment, True), True  # one depth too far, and 1 mm segments were left to all
         if len(lengths) > 2 and _reached(finer) < _reached(wires):
             reason = "with shorter ones fewer depths are reached"
             if np.isnan(num).all():  # of the longer ones, whose error is four times that of the shorter
@@ -87,7 +90,7 @@ def resolve(insert: Insert, lengths: Sequence[float]) -> Resolved:
             continue
         # a wire that is about to snap goes one way or the other for tiny causes, with segments of any length
         away = ~(moved <= AGREED_MM) & np.array([not wire.uncertain for wire in finer], dtype=bool)
-        segment, wires = shorter, finer
+        segment, wires, refined = shorter, finer, True
         num, push = _bounds(moved, pushed)
         if not away.any():
             reason = f"halving them moved no wire by more than {AGREED_MM} mm, near snaps apart"
@@ -98,7 +101,7 @@ def resolve(insert: Insert, lengths: Sequence[float]) -> Resolved:
             )
         else:
             reason = f"at {int(away.sum())} of {len(num)} depths the wire still depends on their length"
-    if segment == lengths[0] and len(lengths) > 1:
+    if not refined:
         wires = insert(segment, True)
     return Resolved(segment, wires, num, push, reason)
 

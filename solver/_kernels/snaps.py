@@ -96,6 +96,12 @@ def may_fork(handle: Any, k: int, depth: float, used: int) -> bool:
 
 
 @merged
+def _least_energy(problem: Problem, k: int) -> float:
+    """Energy, N mm, below which all is rounding: where a wire just left the wall that was a snap of 1e-39 N mm."""
+    return float(tol.ENERGY_FLOOR_ANGLE**2 * problem.chain.bend[k - 1])
+
+
+@merged
 def balance_work(handle: Any, k: int, reached: tuple[float, float, float]) -> WorkBalance:
     """Work out the hand's work in a step, by the trapezium rule, and what became of it."""
     problem, at, report, introducer = handle.problem, handle.place[0], handle.report[0], handle.introducer
@@ -115,8 +121,7 @@ def balance_work(handle: Any, k: int, reached: tuple[float, float, float]) -> Wo
     work = max(abs(push), abs(at.push)) * abs(ahead) + max(abs(torque), abs(at.torque)) * abs(turn)
     work += max(abs(pull), abs(at.pull)) * abs(onwards)
     large = tol.WORK_SHARE * work + tol.ENERGY_SHARE * max(abs(reached[2]), abs(at.energy)) + tol.LOSS_SHARE * rubbed
-    # where a wire just left the wall, the rounding of an energy of 0 was a snap of 1e-39 N mm
-    large += tol.ENERGY_FLOOR_ANGLE**2 * problem.chain.bend[k - 1] if k > 0 else 0.0
+    large += _least_energy(problem, k) if k > 0 else 0.0
     change = abs((push - at.push) * ahead) + abs((torque - at.torque) * turn)
     way = max(abs(ahead), abs(onwards))
     share = max(way / introducer.step, abs(reached[1] - at.roll) / introducer.turn)
@@ -141,7 +146,7 @@ def beyond_catheter(handle: Any, k: int, depth: float, balance: WorkBalance) -> 
     if back < 0 or cut < back + 2 or cut > k - 2:
         return nothing
     missing, work, change, energy = work_on(handle.problem, cut, k, back)
-    large = tol.WORK_SHARE * work + tol.ENERGY_SHARE * energy
+    large = tol.WORK_SHARE * work + tol.ENERGY_SHARE * energy + _least_energy(handle.problem, k)
     push, torque, pull = balance.push, balance.torque, balance.pull
     return WorkBalance(push, torque, pull, balance.way, balance.share, missing, missing, large, change, balance.gives)
 
@@ -214,10 +219,13 @@ def trust(handle: Any, k: int, reached: tuple[float, float, float], doubtful: bo
 
 @merged
 def way_of_joints(problem: Problem, at: Any, k: int, segment: float) -> float:
-    """Largest way of a joint in this step, mm. Joints are counted from the tip: there they stay with the material."""
+    """Largest way of a joint in this step, mm. Joints are counted from the tip: there they stay with the material.
+
+    The one at the entry is no piece of the wire: where their number changes, the next lies half a segment further on.
+    """
     x, was = problem.state.x, segments_at(at.inserted, segment)[0]
     common = min(k, was)
-    return farthest(x[CURRENT], k - common, x[LAST_GOOD], was - common, common + 1)
+    return farthest(x[CURRENT], k - common + 1, x[LAST_GOOD], was - common + 1, common)
 
 
 @merged

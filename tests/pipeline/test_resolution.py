@@ -119,6 +119,18 @@ def test_a_length_that_loses_depths_is_not_taken() -> None:
     assert "fewer depths" in apart.reason
 
 
+def test_a_depth_that_only_rough_steps_reach_leaves_shorter_lengths_to_the_others() -> None:
+    """One depth typed as 200 for 20: as many were reached with 1 mm as with 0.5, and all kept wires of 1 mm."""
+
+    def one(segment_mm: float, refined: bool) -> Sequence[Solution]:
+        wires = insert(bend(20.0), segment_mm)
+        return [*wires[:-1], replace(wires[-1], status=Status.STALLED)] if refined else wires
+
+    found = resolve(one, lengths_mm("auto", 0.0))
+    assert found.segment_mm < 1.0
+    assert "fewer depths" not in found.reason
+
+
 def test_a_depth_that_shorter_lengths_lose_leaves_the_others_their_bound() -> None:
     """It took it from all: wires of 1 mm segments were 0.13 mm off, ok, without a word."""
 

@@ -164,6 +164,18 @@ def test_a_long_way_of_the_catheter_is_taken_in_steps_that_do_not_matter() -> No
     np.testing.assert_allclose(ways[0].joints_mm, ways[1].joints_mm, rtol=0.0, atol=1e-6)
 
 
+@pytest.mark.parametrize(("rest", "depth", "share"), [(0.2, 25.8, 0.525), (0.1, 24.8, 0.595)])
+def test_a_joint_more_is_no_snap(rest: float, depth: float, share: float) -> None:
+    """Where joints become more the one at the entry has no partner: a snap of 0.25 mm, and then uncertain depths."""
+    wire = GuideWire(0.5, 0.18, [[0, 0.16], [15, 6.6]], [[0, rest], [8, rest], [8, 0]])
+    insertion = Insertion(
+        wire, VesselWall(bend_grid(), 9.0), [0, 0, 22], [0, 0, 1], material_axis=[1, 0, 0],
+        catheter=Catheter(30.0, 0.4), step_mm=0.1,
+    )  # fmt: skip
+    depths = np.array([depth - 1.0, depth])
+    assert not any(one.snaps or one.uncertain for one in insertion.to_depths(depths, catheter_mm=share * depths))
+
+
 def test_branches_and_checkpoints() -> None:
     insertion = in_bend()
     list(insertion.to_depths([30.0], 0.0, 12.0))
