@@ -7,6 +7,8 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
+from solver import wall, wire
+
 
 class Strict(BaseModel):
     """A table: unknown keys are errors, values are frozen."""
@@ -102,6 +104,15 @@ def _checked(value: Profile, *, lowest: float, highest: float) -> Profile:
     return value
 
 
+def _torsional(value: float) -> float:
+    most = wire.STIFFNESS_N_MM2.largest
+    if most < value < math.inf:
+        raise ValueError(f"{value:g}; expected {most:g} at most, or inf: the tip turns as the hand does")
+    return value
+
+
+Torsional = Annotated[float, Field(ge=wire.STIFFNESS_N_MM2.least), Number, AfterValidator(_torsional)]
+WallStiffness = Annotated[float, Field(ge=wall.STIFFNESS_N_MM2.least, le=wall.STIFFNESS_N_MM2.largest), Number]
 Axis = Annotated[Vector, AfterValidator(_not_zero)]
 Direction = Annotated[Vector, AfterValidator(_unit)]
 """A vector, normalised to length 1."""

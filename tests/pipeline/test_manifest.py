@@ -88,6 +88,12 @@ def test_defaults_paths_and_order(tmp_path: Path) -> None:
         (('id = "run1"', 'id = "a/b"'), "id"),
         (("[30.0, 5.0]", "[-3.0, 5.0]"), "distances from the tip"),
         (("schema = 1", "schema = 2"), "schema"),
+        (("wire = ", "wall = {stiffness_N_mm2 = 1e-12}\nwire = "), "= 1e-12: expected a number from 1e-09; correct it"),
+        (
+            ("radius_mm", "torsional_stiffness_N_mm2 = 5e-324\nradius_mm"),
+            "torsional_stiffness_N_mm2 = 5e-324: expected a number from 1e-12",
+        ),
+        (("radius_mm", "torsional_stiffness_N_mm2 = 1e13\nradius_mm"), "1e+13; expected 1e+12 at most, or inf"),
         (('wire = "soft"', 'wire = "soft"\nroll_deg = "fitted"'), "did you mean 'fit'?"),
         (('wire = "soft"', 'wire = "soft"\ncalibrated = "x"'), "calibrated: unknown key; write parameters = FILE"),
         *(

@@ -74,6 +74,8 @@ def test_settings_that_were_used_with_parameters_ask_for_these(tmp_path: Path) -
         ("simulate.entry=foo", '"traced" or "manifest"'),
         ("solver.segment_mm=-3", "from 0.01"),
         ("compare.sample_mm=0", "from 0.01"),
+        ("segment.scale=3", "= 3: expected a whole number from 0 to 2"),
+        ("solver.tolerance=5e-324", "= 5e-324: expected a number from 1e-300"),
         ("segment.outer_mm=nan", "= nan: expected a number from 0.1 to 50"),
         ("trace.rotation_axis=[0,0,0]", "length zero"),
     ],
