@@ -24,6 +24,8 @@ def _number(value: Any) -> Any:
 
 
 Number = BeforeValidator(_number)
+Truth = Annotated[bool, Field(strict=True)]
+"""true or false; pydantic takes '1', -0.0 and "off", too."""
 Finite = Annotated[float, Field(ge=-1e9, le=1e9, allow_inf_nan=False), Number]
 PerFrame = Annotated[tuple[Finite, ...], Field(min_length=1)]
 Positive = Annotated[float, Field(gt=0, le=1e9, allow_inf_nan=False), Number]
@@ -97,10 +99,10 @@ def _checked(value: Profile, *, lowest: float, highest: float) -> Profile:
         raise ValueError("an empty profile; give a number or [[distance from tip mm, value], ...]")
     distances = [s for s, _ in pairs]
     if distances != sorted(distances) or not 0 <= distances[0] <= distances[-1] < math.inf:
-        raise ValueError(f"distances from the tip {distances} must be >= 0 and must not decrease")
+        raise ValueError(f"distances from the tip {distances!s:.200} must be >= 0 and must not decrease")
     if any(not lowest <= v <= highest for _, v in pairs):
         above = "" if lowest < 0 else " and above 0"
-        raise ValueError(f"values {[v for _, v in pairs]} must be finite{above}, at most {highest:g}")
+        raise ValueError(f"values {[v for _, v in pairs]!s:.200} must be finite{above}, at most {highest:g}")
     return value
 
 
@@ -123,9 +125,14 @@ FiniteProfile = Annotated[Profile, AfterValidator(partial(_checked, lowest=-100.
 
 def _visible(value: Any) -> Any:
     """A name without blanks around it; ValueError for one with characters that nobody sees, as two would differ by."""
-    if isinstance(value, str) and not value.strip().isprintable():
-        raise ValueError(f"{value!r} has characters that are not seen; write it in letters, digits and blanks")
-    return value.strip() if isinstance(value, str) else value
+    if not isinstance(value, str):
+        return value
+    name = value.strip()
+    if value and not name:
+        raise ValueError("blanks alone; write it in letters and digits, or leave the key out")
+    if not name.isprintable():
+        raise ValueError(f"{value!r:.200} has characters that are not seen; write it in letters and digits")
+    return name
 
 
 Name = Annotated[str, BeforeValidator(_visible)]

@@ -88,6 +88,7 @@ def test_defaults_paths_and_order(tmp_path: Path) -> None:
         (('id = "run1"', 'id = "a/b"'), "id"),
         (("[30.0, 5.0]", "[-3.0, 5.0]"), "distances from the tip"),
         (("schema = 1", "schema = 2"), "schema"),
+        (("wire = ", 'phantom = " "\nwire = '), "phantom: blanks alone"),
         (("wire = ", "wall = {stiffness_N_mm2 = 1e-12}\nwire = "), "= 1e-12: expected a number from 1e-09; correct it"),
         (
             ("radius_mm", "torsional_stiffness_N_mm2 = 5e-324\nradius_mm"),
@@ -115,6 +116,14 @@ def test_defaults_paths_and_order(tmp_path: Path) -> None:
 )
 def test_what_is_wrong_is_said(tmp_path: Path, change: tuple[str, str], expected: str) -> None:
     assert expected in problems(tmp_path, GOOD.replace(*change))
+
+
+@pytest.mark.parametrize(
+    "change", [('"run1"', str([1.0] * 5000)), ('= "soft"', f"= {[1.0] * 5000}"), ('"run1"', f'"{"a" * 9999}"')]
+)
+def test_what_was_found_is_cut_where_it_is_long(tmp_path: Path, change: tuple[str, str]) -> None:
+    """A list in place of an id was told whole, 25 kB."""
+    assert len(problems(tmp_path, GOOD.replace(*change))) < 600
 
 
 def test_all_problems_come_at_once(tmp_path: Path) -> None:
