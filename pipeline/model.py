@@ -15,11 +15,13 @@ from pydantic import ConfigDict, Field, WithJsonSchema
 from pipeline.ranges import (
     FiniteProfile,
     Friction,
+    LogSigma,
     NonNegative,
     Number,
     OpacityProfile,
     PositiveProfile,
     Radius,
+    Sigma,
     Torsional,
     WallStiffness,
 )
@@ -82,12 +84,12 @@ class Uncertainty:
     """
 
     __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(extra="forbid")
-    lumen_mm: NonNegative | None = None
-    lumen_bias_mm: NonNegative | None = None
-    rest_curvature: NonNegative | None = None
-    taper: NonNegative | None = None
-    wall_stiffness: NonNegative | None = None
-    friction: NonNegative | None = None
+    lumen_mm: Sigma | None = None
+    lumen_bias_mm: Sigma | None = None
+    rest_curvature: Sigma | None = None
+    taper: LogSigma | None = None
+    wall_stiffness: LogSigma | None = None
+    friction: Sigma | None = None
 
 
 @dataclass(frozen=True, eq=False)

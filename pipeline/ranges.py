@@ -24,12 +24,26 @@ def _number(value: Any) -> Any:
 
 
 Number = BeforeValidator(_number)
+LEAST = 1e-9
+"""What is smaller is 0 in any unit that is used here; the square of 5e-324 is, and was divided by."""
 Truth = Annotated[bool, Field(strict=True)]
 """true or false; pydantic takes '1', -0.0 and "off", too."""
 Finite = Annotated[float, Field(ge=-1e9, le=1e9, allow_inf_nan=False), Number]
 PerFrame = Annotated[tuple[Finite, ...], Field(min_length=1)]
-Positive = Annotated[float, Field(gt=0, le=1e9, allow_inf_nan=False), Number]
+Positive = Annotated[float, Field(ge=LEAST, le=1e9, allow_inf_nan=False), Number]
 NonNegative = Annotated[float, Field(ge=0, le=1e9, allow_inf_nan=False), Number]
+
+
+def _not_tiny(value: float) -> float:
+    if 0 < value < LEAST:
+        raise ValueError(f"{value:g}; expected 0, which is exact, or {LEAST:g} at least")
+    return value
+
+
+Sigma = Annotated[NonNegative, AfterValidator(_not_tiny)]
+"""A standard deviation."""
+LogSigma = Annotated[float, Field(ge=0, le=3, allow_inf_nan=False), Number]
+"""Standard deviation of a logarithm: at 3 nothing but a factor of 20 either way is known."""
 Share = Annotated[float, Field(ge=0, le=1), Number]
 Count = Annotated[int, Field(ge=0, le=10**6), Number]
 PositiveCount = Annotated[int, Field(ge=1, le=10**6), Number]
@@ -47,7 +61,7 @@ Friction = Annotated[float, Field(ge=0, le=10, allow_inf_nan=False), Number]
 Turn = Annotated[float, Field(ge=-1e5, le=1e5, allow_inf_nan=False), Number]
 """An angle, degrees."""
 Roll = Turn | Annotated[tuple[Turn, ...], Field(min_length=1)] | Literal["fit"]
-Spread = Annotated[float, Field(ge=0, le=180, allow_inf_nan=False), Number]
+Spread = Annotated[float, Field(ge=0, le=180, allow_inf_nan=False), Number, AfterValidator(_not_tiny)]
 """Standard deviation of an angle, degrees: beyond half a turn nothing is known of it."""
 Step = Annotated[float, Field(ge=0.01, le=100, allow_inf_nan=False), Number]
 """Step along a curve, mm: below 10 µm a run would hang instead of getting more accurate."""

@@ -29,12 +29,12 @@ from pipeline.ranges import (
     Depths,
     Direction,
     Name,
-    NonNegative,
     Number,
     PerFrame,
     Point,
     Positive,
     Roll,
+    Sigma,
     Spread,
     Strict,
 )
@@ -83,12 +83,12 @@ class Case(Strict):
     entry_direction: Direction
     entry: Annotated[str, Field(pattern=r"^(case:.+)?$", json_schema_extra=ANOTHER)] = ""
     entry_case: Annotated["Case | None", *FILLED_IN] = None
-    entry_sigma_mm: NonNegative | None = None
+    entry_sigma_mm: Sigma | None = None
     entry_direction_sigma_deg: Spread = 2.0
     material_axis: Axis | None = None
     wire: Annotated[Wire, BeforeValidator(_wire), WithJsonSchema(ONE_OF_THEM)]
     insertion_mm: Depths | None = None
-    insertion_sigma_mm: NonNegative | None = None
+    insertion_sigma_mm: Sigma | None = None
     spacing_mm: tuple[Positive, Positive, Positive] | None = None
     lumen: MaskText | None = None
     traces: Sources = ()

@@ -88,6 +88,15 @@ def test_defaults_paths_and_order(tmp_path: Path) -> None:
         (('id = "run1"', 'id = "a/b"'), "id"),
         (("[30.0, 5.0]", "[-3.0, 5.0]"), "distances from the tip"),
         (("schema = 1", "schema = 2"), "schema"),
+        (("wire = ", "entry_sigma_mm = 5e-324\nwire = "), "entry_sigma_mm: 4.94066e-324; expected 0, which"),
+        (
+            ("wire = ", "roll_sigma_deg = 1e-200\nwire = "),
+            "roll_sigma_deg: 1e-200; expected 0, which is exact, or 1e-09",
+        ),
+        (
+            ("wire = ", "uncertainty = {taper = 1e9}\nwire = "),
+            "uncertainty taper = 1000000000.0: expected a number from 0 to 3",
+        ),
         (("wire = ", 'phantom = " "\nwire = '), "phantom: blanks alone"),
         (("wire = ", "wall = {stiffness_N_mm2 = 1e-12}\nwire = "), "= 1e-12: expected a number from 1e-09; correct it"),
         (

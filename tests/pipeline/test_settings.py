@@ -78,6 +78,7 @@ def test_settings_that_were_used_with_parameters_ask_for_these(tmp_path: Path) -
         ("compare.simulated_nulls='1'", "expected true or false"),
         ("load.resample=-0.0", "= -0.0: expected true or false"),
         ("load.resample=yes", "expected true or false"),
+        ("segment.homogeneity_sigma=5e-324", "= 5e-324: expected a number from 1e-09"),
         ("segment.scale=3", "= 3: expected a whole number from 0 to 2"),
         ("solver.tolerance=5e-324", "= 5e-324: expected a number from 1e-300"),
         ("segment.outer_mm=nan", "= nan: expected a number from 0.1 to 50"),
