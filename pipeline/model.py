@@ -15,12 +15,15 @@ from pydantic import ConfigDict, Field, WithJsonSchema
 from pipeline.ranges import (
     FiniteProfile,
     Friction,
+    LogSigma,
     NonNegative,
     Number,
     OpacityProfile,
-    Positive,
     PositiveProfile,
     Radius,
+    Sigma,
+    Torsional,
+    WallStiffness,
 )
 from pipeline.status import FrameStatus
 from pipeline.wording import WRITTEN_HERE
@@ -42,7 +45,7 @@ class Wire:
     radius_mm: Radius
     bending_stiffness_N_mm2: PositiveProfile
     rest_curvature_per_mm: FiniteProfile = 0.0
-    torsional_stiffness_N_mm2: Annotated[float, Field(gt=0), Number] = float("inf")
+    torsional_stiffness_N_mm2: Torsional = float("inf")
     weight_N_per_mm: Annotated[float, Field(ge=0, le=1), Number] = 0.0
     opacity: OpacityProfile | None = None
 
@@ -67,7 +70,7 @@ class Wall:
     """The vessel's elastic wall: its stiffness per mm of wire, and Coulomb friction."""
 
     __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(extra="forbid")
-    stiffness_N_mm2: Positive = 2.0
+    stiffness_N_mm2: WallStiffness = 2.0
     friction: Friction = 0.0
 
 
@@ -81,12 +84,12 @@ class Uncertainty:
     """
 
     __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(extra="forbid")
-    lumen_mm: NonNegative | None = None
-    lumen_bias_mm: NonNegative | None = None
-    rest_curvature: NonNegative | None = None
-    taper: NonNegative | None = None
-    wall_stiffness: NonNegative | None = None
-    friction: NonNegative | None = None
+    lumen_mm: Sigma | None = None
+    lumen_bias_mm: Sigma | None = None
+    rest_curvature: Sigma | None = None
+    taper: LogSigma | None = None
+    wall_stiffness: LogSigma | None = None
+    friction: Sigma | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,6 +7,8 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
+from solver import wall, wire
+
 
 class Strict(BaseModel):
     """A table: unknown keys are errors, values are frozen."""
@@ -22,10 +24,26 @@ def _number(value: Any) -> Any:
 
 
 Number = BeforeValidator(_number)
+LEAST = 1e-9
+"""What is smaller is 0 in any unit that is used here; the square of 5e-324 is, and was divided by."""
+Truth = Annotated[bool, Field(strict=True)]
+"""true or false; pydantic takes '1', -0.0 and "off", too."""
 Finite = Annotated[float, Field(ge=-1e9, le=1e9, allow_inf_nan=False), Number]
 PerFrame = Annotated[tuple[Finite, ...], Field(min_length=1)]
-Positive = Annotated[float, Field(gt=0, le=1e9, allow_inf_nan=False), Number]
+Positive = Annotated[float, Field(ge=LEAST, le=1e9, allow_inf_nan=False), Number]
 NonNegative = Annotated[float, Field(ge=0, le=1e9, allow_inf_nan=False), Number]
+
+
+def _not_tiny(value: float) -> float:
+    if 0 < value < LEAST:
+        raise ValueError(f"{value:g}; expected 0, which is exact, or {LEAST:g} at least")
+    return value
+
+
+Sigma = Annotated[NonNegative, AfterValidator(_not_tiny)]
+"""A standard deviation."""
+LogSigma = Annotated[float, Field(ge=0, le=3, allow_inf_nan=False), Number]
+"""Standard deviation of a logarithm: at 3 nothing but a factor of 20 either way is known."""
 Share = Annotated[float, Field(ge=0, le=1), Number]
 Count = Annotated[int, Field(ge=0, le=10**6), Number]
 PositiveCount = Annotated[int, Field(ge=1, le=10**6), Number]
@@ -43,7 +61,7 @@ Friction = Annotated[float, Field(ge=0, le=10, allow_inf_nan=False), Number]
 Turn = Annotated[float, Field(ge=-1e5, le=1e5, allow_inf_nan=False), Number]
 """An angle, degrees."""
 Roll = Turn | Annotated[tuple[Turn, ...], Field(min_length=1)] | Literal["fit"]
-Spread = Annotated[float, Field(ge=0, le=180, allow_inf_nan=False), Number]
+Spread = Annotated[float, Field(ge=0, le=180, allow_inf_nan=False), Number, AfterValidator(_not_tiny)]
 """Standard deviation of an angle, degrees: beyond half a turn nothing is known of it."""
 Step = Annotated[float, Field(ge=0.01, le=100, allow_inf_nan=False), Number]
 """Step along a curve, mm: below 10 µm a run would hang instead of getting more accurate."""
@@ -95,13 +113,22 @@ def _checked(value: Profile, *, lowest: float, highest: float) -> Profile:
         raise ValueError("an empty profile; give a number or [[distance from tip mm, value], ...]")
     distances = [s for s, _ in pairs]
     if distances != sorted(distances) or not 0 <= distances[0] <= distances[-1] < math.inf:
-        raise ValueError(f"distances from the tip {distances} must be >= 0 and must not decrease")
+        raise ValueError(f"distances from the tip {distances!s:.200} must be >= 0 and must not decrease")
     if any(not lowest <= v <= highest for _, v in pairs):
         above = "" if lowest < 0 else " and above 0"
-        raise ValueError(f"values {[v for _, v in pairs]} must be finite{above}, at most {highest:g}")
+        raise ValueError(f"values {[v for _, v in pairs]!s:.200} must be finite{above}, at most {highest:g}")
     return value
 
 
+def _torsional(value: float) -> float:
+    most = wire.STIFFNESS_N_MM2.largest
+    if most < value < math.inf:
+        raise ValueError(f"{value:g}; expected {most:g} at most, or inf: the tip turns as the hand does")
+    return value
+
+
+Torsional = Annotated[float, Field(ge=wire.STIFFNESS_N_MM2.least), Number, AfterValidator(_torsional)]
+WallStiffness = Annotated[float, Field(ge=wall.STIFFNESS_N_MM2.least, le=wall.STIFFNESS_N_MM2.largest), Number]
 Axis = Annotated[Vector, AfterValidator(_not_zero)]
 Direction = Annotated[Vector, AfterValidator(_unit)]
 """A vector, normalised to length 1."""
@@ -112,9 +139,14 @@ FiniteProfile = Annotated[Profile, AfterValidator(partial(_checked, lowest=-100.
 
 def _visible(value: Any) -> Any:
     """A name without blanks around it; ValueError for one with characters that nobody sees, as two would differ by."""
-    if isinstance(value, str) and not value.strip().isprintable():
-        raise ValueError(f"{value!r} has characters that are not seen; write it in letters, digits and blanks")
-    return value.strip() if isinstance(value, str) else value
+    if not isinstance(value, str):
+        return value
+    name = value.strip()
+    if value and not name:
+        raise ValueError("blanks alone; write it in letters and digits, or leave the key out")
+    if not name.isprintable():
+        raise ValueError(f"{value!r:.200} has characters that are not seen; write it in letters and digits")
+    return name
 
 
 Name = Annotated[str, BeforeValidator(_visible)]

@@ -192,9 +192,9 @@ def as_toml(value: Any) -> str:
     return json.dumps(value, ensure_ascii=False, default=str)
 
 
-def shortened(text: str) -> str:
-    """A text of at most ``LONGEST`` characters."""
-    return text if len(text) <= LONGEST else f"{text[: LONGEST - 3]}..."
+def shortened(text: str, longest: int = LONGEST) -> str:
+    """A text of at most ``longest`` characters."""
+    return text if len(text) <= longest else f"{text[: longest - 3]}..."
 
 
 def in_words(node: Schema, definitions: Schema | None = None, *, exact: bool = False, null: bool = True) -> str:

@@ -35,6 +35,8 @@ from solver.wall import VesselWall
 from solver.wire import GuideWire
 from solver.workspace import QUADRATURES, Workspace
 
+TOLERANCE = Range(1e-300, 1.0 - 1e-9, "1e-9 is the default")
+
 
 def base_frame(direction: Array, material_axis: ArrayLike | None, roll_deg: float) -> Array:
     """Columns: material axes 1 and 2 and the direction of the wire at the entry, rolled right-handed about it."""
@@ -88,7 +90,7 @@ class Settings:
         """Refuse what cannot work."""
         choice("solver", "method", self.method, METHODS)
         choice("solver", "quadrature", self.quadrature, QUADRATURES)
-        number("solver", "tolerance", self.tolerance, Range(1e-300, 1.0 - 1e-9, "1e-9 is the default"))
+        number("solver", "tolerance", self.tolerance, TOLERANCE)
         whole("solver", "max_iterations", self.max_iterations, 1_000_000)
 
     @property

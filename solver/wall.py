@@ -17,6 +17,7 @@ from solver.errors import refuse
 from solver.grid import Grid, read_only
 from solver.wire import THICKEST_MM
 
+STIFFNESS_N_MM2 = Range(1e-9, 1e9, "0.1 to 100 is usual")
 OFFSET_MM = Range(-FAR_MM, FAR_MM, "a tenth of a voxel is usual")
 MAKE_A_DISTANCE = (
     "a mask of the lumen is made one by scipy.ndimage: gaussian_filter("
@@ -133,13 +134,14 @@ class VesselWall:
     radius). "samples:N" takes the mean over N points around each joint. With the same k, a wall is softer with samples,
     and the more so the less deep the wire is pressed in, since few of the N points are then in the wall.
     Beyond the grid the distance continues linearly. Raises ValueError for NaN or inf in the grid; warns if no value is
-    negative, or if the slope at the wall shows that the values are no distances in mm.
+    negative, or if the slope at the wall shows that the values are no distances in mm; ``doubts`` says so, too.
     """
 
     distance: Grid
     stiffness_N_mm2: float
     friction: float = 0.0
     hull: str = "offset"
+    doubts: str = field(init=False, repr=False)
     field: Field = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -147,8 +149,9 @@ class VesselWall:
         self._check_law()
         _ = self.samples
         values = _checked(instance("wall", "distance", self.distance, Grid))
-        if doubts := _doubts(values, self.distance.spacing_mm):
-            warnings.warn(f"wall: distance: {doubts}", stacklevel=3)
+        object.__setattr__(self, "doubts", _doubts(values, self.distance.spacing_mm))
+        if self.doubts:
+            warnings.warn(f"wall: distance: {self.doubts}", stacklevel=3)
         marks = creases(values, self.distance.spacing_mm)
         prefilter(values)
         to_index = np.ascontiguousarray((self.distance.direction / self.distance.spacing_mm).T)
@@ -159,7 +162,7 @@ class VesselWall:
 
     def _check_law(self) -> None:
         """Refuse a stiffness or a friction that no wall has."""
-        number("wall", "stiffness_N_mm2", self.stiffness_N_mm2, Range(1e-9, 1e9, "0.1 to 100 is usual"))
+        number("wall", "stiffness_N_mm2", self.stiffness_N_mm2, STIFFNESS_N_MM2)
         number("wall", "friction", self.friction, Range(0.0, 10.0, "hydrophilic wires have 0.01 to 0.1"))
 
     def like(self, *, stiffness_N_mm2: float | None = None, friction: float | None = None) -> "VesselWall":

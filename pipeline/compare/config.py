@@ -5,7 +5,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from pipeline.ranges import Millimetres, Number
+from pipeline.ranges import Millimetres, Number, Truth
 
 
 @dataclass(frozen=True)
@@ -16,6 +16,6 @@ class CompareConfig:
     """Arc-length step at which both curves are sampled, so that segment lengths cannot flatter."""
     skip_mm: Millimetres = 10.0
     """Length of wire behind the entry that no score counts, since the clamp was fitted there."""
-    simulated_nulls: bool = True
+    simulated_nulls: Truth = True
     """Whether simulators without the roll and without the tip's curve are among the predictors, traces may speak for
     another curve of the tip, and entries.csv is written. That takes 20 more insertions, of a straight wire 4."""

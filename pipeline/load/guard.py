@@ -75,9 +75,11 @@ class Deflated(io.RawIOBase):
         """Fill as much of the buffer as one step unpacks; 0 at the end."""
         while True:
             packed = self.left or self.file.read(1 << 18)
-            if self.unpack.eof:  # what follows a whole member is another one, or padding
-                packed = packed.lstrip(b"\0")
-                self.unpack = zlib.decompressobj(47) if packed else self.unpack
+            if self.unpack.eof and packed:  # what follows a whole member is another one, or padding
+                self.left = packed.lstrip(b"\0")
+                if not self.left:
+                    continue
+                packed, self.unpack = self.left, zlib.decompressobj(47)
             if not packed:
                 if not self.unpack.eof:
                     raise EOFError("the packed data end too early")
@@ -101,6 +103,13 @@ def unpacked(path: Path, packing: str, offset: int) -> IO[bytes]:
     if packing == "deflate":
         return io.BufferedReader(Deflated(file), 1 << 18)
     return bz2.BZ2File(file) if packing == "bzip2" else file
+
+
+def last_word(path: Path) -> int:
+    """The last four bytes of a file as a number: of a gzip file of one member, the bytes that it unpacks to."""
+    with opened(path) as file:
+        file.seek(-4, os.SEEK_END)
+        return int.from_bytes(file.read(4), "little")
 
 
 def skip(file: IO[bytes], count: int, *, packed: bool) -> None:

@@ -47,6 +47,8 @@ def head_of(path: Path) -> Head:
         float(numbers(path, tags, f"ElementToIntensityFunction{name}", 1, missing=text)[0])
         for name, text in (("Slope", "1"), ("Offset", "0"))
     )
+    if slope == 0.0:
+        raise unusable(path, "ElementToIntensityFunctionSlope 0, all grey is one; allowed: another; correct the header")
     said = int(numbers(path, tags, "CompressedDataSize", 1, whole=True, missing="0")[0])
     geometry, assumed = _geometry(path, tags, count)
     return Head(

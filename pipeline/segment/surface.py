@@ -41,6 +41,7 @@ PLACES = 30_000
 
 
 Shape = tuple[int, int, int]
+NONE: Index = np.zeros(0, np.int64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,12 +69,15 @@ class Site:
         return Grid(empty, self.volume.spacing_mm, self.volume.to_mm(self.corner), self.volume.direction)
 
 
-def padded_box(voxels: Index, grid: Grid, margin_mm: float) -> tuple[Index, Shape]:
-    """The box of the voxels (flat) with ``margin_mm`` around them: its first voxel, and its shape once padded."""
+def padded_box(voxels: Index, grid: Grid, margin_mm: float, more: Index = NONE) -> tuple[Index, Shape]:
+    """The box of the voxels (flat) with ``margin_mm`` around them: its first voxel, and its shape once padded.
+
+    more : further voxels that the box must hold, or none.
+    """
     margin = np.ceil(margin_mm / grid.spacing_mm).astype(np.int64)
-    first, last = extent(voxels, grid.shape)
-    low = np.maximum(first - margin, 0)
-    high = np.minimum(last + margin + 1, grid.shape)
+    ends = np.stack([extent(flat, grid.shape) for flat in (voxels, more) if len(flat)])
+    low = np.maximum(ends[:, 0].min(axis=0) - margin, 0)
+    high = np.minimum(ends[:, 1].max(axis=0) + margin + 1, grid.shape)
     a, b, c = (int(n) + 2 * PAD for n in high - low)
     return low, (a, b, c)
 
@@ -89,12 +93,9 @@ def boxed(voxels: Index, grid: Grid) -> Inner:
     return numbered(shape, into_box(voxels, grid, corner, shape))
 
 
-def prepare(volume: Grid, order: Index, taps: NDArray[np.float32], margin_mm: float, more: Index | None = None) -> Site:
-    """The site of the voxels at flat indices ``order`` of a C-contiguous volume, with ``margin_mm`` around them.
-
-    more : further voxels that the box must hold.
-    """
-    corner, shape = padded_box(order if more is None else np.concatenate([order, more]), volume, margin_mm)
+def prepare(volume: Grid, order: Index, taps: NDArray[np.float32], margin_mm: float, more: Index = NONE) -> Site:
+    """The site of the voxels at flat indices ``order`` of a C-contiguous volume; the rest as in ``padded_box``."""
+    corner, shape = padded_box(order, volume, margin_mm, more)
     state = sparse_zeros(shape, np.uint8)
     flat = into_box(order, volume, corner, shape)
     state.reshape(-1)[flat] = 1

@@ -111,7 +111,7 @@ def beyond_skirt(
     order : the vessel's voxels, of which those from a grey ``bright`` on count, and so do those in MISSED layers around
     it. Also returns whether there are any.
     """
-    corner, shape = padded_box(low, volume, 0.0)
+    corner, shape = padded_box(low, volume, 0.0, order)  # a low segment.threshold finds more than the faintest grey
     main, wide = (into_box(o, volume, corner, shape) for o in (order, low))
     near = low[_layers(main, wide, shape, MISSED) > 0]
     thick = near[smooth_voxels(volume.values, taps, near) >= bright]

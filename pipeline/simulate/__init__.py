@@ -1,5 +1,6 @@
 """simulate: the insertion replayed from the clamp to the depth of every frame, each from the one before."""
 
+import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import lru_cache
@@ -68,8 +69,13 @@ def together(insertions: Sequence[Insertion], ways: Sequence[Way], threads: int 
 
 @lru_cache(maxsize=1)
 def wall_of(distance: Grid, hull: str) -> VesselWall:
-    """The lumen's wall, filtered once for all insertions of a case: with 256^3 voxels that takes a second."""
-    return VesselWall(distance, stiffness_N_mm2=1.0, hull=hull)
+    """The lumen's wall, filtered once for all insertions of a case: with 256^3 voxels that takes a second.
+
+    Its doubts are for the case's warnings, not for the terminal.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)
+        return VesselWall(distance, stiffness_N_mm2=1.0, hull=hull)
 
 
 def insertion_of(

@@ -9,6 +9,7 @@ from pydantic_core import PydanticCustomError
 
 from pipeline.ranges import Factor, Friction, NonNegative, Number, PositiveCount, Step, Turn
 from solver._kernels.minimise import METHODS
+from solver.relax import TOLERANCE
 from solver.wire import SEGMENT_MM
 
 Segment = Annotated[float, Field(ge=0.01, le=SEGMENT_MM.largest, allow_inf_nan=False), Number] | Literal["auto"]
@@ -34,7 +35,7 @@ class SolverConfig:
     """Length of the wire's rigid segments. auto halves it until that changes nothing."""
     hull: Annotated[str, Field(pattern=rf"^(offset|samples:{SAMPLES})$", json_schema_extra=HULLS)] = "offset"
     """offset (the hull's deepest point) or samples:N (the mean of N points, a softer wall for the same stiffness)."""
-    tolerance: Annotated[float, Field(gt=0, lt=1), Number] = 1e-9
+    tolerance: Annotated[float, Field(ge=TOLERANCE.least, le=TOLERANCE.largest), Number] = 1e-9
     """Newton decrement, relative to the energy, at which a step counts as converged."""
     max_iterations: PositiveCount = 200
     """Iterations allowed for one relaxation."""

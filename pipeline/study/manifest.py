@@ -29,12 +29,12 @@ from pipeline.ranges import (
     Depths,
     Direction,
     Name,
-    NonNegative,
     Number,
     PerFrame,
     Point,
     Positive,
     Roll,
+    Sigma,
     Spread,
     Strict,
 )
@@ -42,14 +42,14 @@ from pipeline.status import InputError, did_you_mean
 from pipeline.study.case_rules import borrowing_problems, catheter_problems, not_one_per_frame
 from pipeline.study.others import LONGEST_NAME, OthersText
 from pipeline.study.sources import MaskText, PathText, Sources, SourceText, read_tables
-from pipeline.wording import WRITTEN_HERE, Place, as_toml, said, saying, sentences
+from pipeline.wording import WRITTEN_HERE, Place, as_toml, said, saying, sentences, shortened
 
 
 def _wire(value: Any, info: ValidationInfo) -> Wire:
     """The wire of that name among ``[wires.*]``, which are read first."""
     wires: dict[str, Wire] = (info.context or {}).get("wires", {})
     if not isinstance(value, str) or value not in wires:
-        problem = f"wire {as_toml(value)} is not among [wires.*]; {did_you_mean(str(value), wires)}"
+        problem = f"wire {shortened(as_toml(value))} is not among [wires.*]; {did_you_mean(str(value), wires)}"
         # where the wires themselves are wrong, that is all there is to say
         raise saying(*[problem] * bool(wires))
     return wires[value]
@@ -83,12 +83,12 @@ class Case(Strict):
     entry_direction: Direction
     entry: Annotated[str, Field(pattern=r"^(case:.+)?$", json_schema_extra=ANOTHER)] = ""
     entry_case: Annotated["Case | None", *FILLED_IN] = None
-    entry_sigma_mm: NonNegative | None = None
+    entry_sigma_mm: Sigma | None = None
     entry_direction_sigma_deg: Spread = 2.0
     material_axis: Axis | None = None
     wire: Annotated[Wire, BeforeValidator(_wire), WithJsonSchema(ONE_OF_THEM)]
     insertion_mm: Depths | None = None
-    insertion_sigma_mm: NonNegative | None = None
+    insertion_sigma_mm: Sigma | None = None
     spacing_mm: tuple[Positive, Positive, Positive] | None = None
     lumen: MaskText | None = None
     traces: Sources = ()
@@ -293,5 +293,6 @@ def _named(data: dict[str, Any], place: Place) -> Place:
         case ("case", int(number), *rest):
             case = data["case"][number]
             name = case.get("id", number) if isinstance(case, dict) else number
-            return (f"case {name!r}" if isinstance(name, str) else f"case {as_toml(name)}", *rest)
+            called = repr(name) if isinstance(name, str) else as_toml(name)
+            return (f"case {shortened(called, 2 * LONGEST_NAME)}", *rest)
     return place

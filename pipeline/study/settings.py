@@ -19,7 +19,7 @@ from pipeline.simulate.config import SimulateConfig, SolverConfig
 from pipeline.status import InputError, did_you_mean
 from pipeline.study.sources import read_tables
 from pipeline.trace.config import TraceConfig
-from pipeline.wording import said, sentences
+from pipeline.wording import as_toml, said, sentences, shortened
 from reports.texts import MalformedError, UnreadableError, toml_of
 
 
@@ -84,6 +84,9 @@ def parse_assignment(text: str, source: str = "command line") -> Setting:
     name, equals, raw = text.partition("=")
     if not equals or "." not in name:
         raise SettingsError([f"{source}: {text!r} is no setting; write table.key=value, as in solver.segment_mm=0.5"])
+    if {*"\r\n"} & {*raw.strip()}:
+        why = "a line break, and what follows would be lost; write one value, and further settings with --set each"
+        raise SettingsError([f"{source}: {name.strip()} = {shortened(as_toml(raw.strip()))}: {why}"])
     try:
         value = toml_of(f"value = {raw.strip()}", f"{source}: {name.strip()}")["value"]
     except MalformedError:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import struct
 import zipfile
 from pathlib import Path
@@ -96,6 +97,29 @@ def test_a_crop_of_an_mha_is_the_crop_of_all_of_it(tmp_path: Path, kind: type, c
     crop = load(read_header(path), box)
     assert crop.values.dtype == kind
     np.testing.assert_array_equal(crop.values, values[1:5, 0:6, 2:9])
+
+
+@pytest.mark.parametrize("suffix", [".nii.gz", ".nrrd"])
+def test_what_follows_packed_voxels_is_seen_wherever_a_crop_ends(tmp_path: Path, suffix: str) -> None:
+    """Crops, which frames are read as, ended before it: 5000 bytes of something else passed."""
+    path, box = tmp_path / f"scan{suffix}", ((1, 0, 2), (4, 5, 6))
+    sitk.WriteImage(image_of(numbered()), str(path), useCompression=True)
+    raw = path.read_bytes()
+    begin = raw.index(b"\x1f\x8b\x08")
+    voxels = gzip.decompress(raw[begin:])
+    members = raw[:begin] + gzip.compress(voxels[:400]) + gzip.compress(voxels[400:])
+    for legal in (raw, raw + bytes(600_000), members, members + bytes(5)):
+        path.write_bytes(legal)
+        np.testing.assert_array_equal(load(read_header(path), box).values, numbered()[1:4, 0:5, 2:6])
+    ends = {
+        b"not gzip at all": "damaged",
+        bytes(600_000) + b"no padding": "damaged",
+        gzip.compress(b"more"): "more than",
+    }
+    for added, found in ends.items():
+        path.write_bytes(raw + added)
+        with pytest.raises(LoadError, match=found):
+            load(read_header(path), box)
 
 
 def test_big_endian_and_detached_data_are_read(tmp_path: Path) -> None:

@@ -89,6 +89,22 @@ def test_defaults_paths_and_order(tmp_path: Path) -> None:
         (('id = "run1"', 'id = "a/b"'), "id"),
         (("[30.0, 5.0]", "[-3.0, 5.0]"), "distances from the tip"),
         (("schema = 1", "schema = 2"), "schema"),
+        (("wire = ", "entry_sigma_mm = 5e-324\nwire = "), "entry_sigma_mm: 4.94066e-324; expected 0, which"),
+        (
+            ("wire = ", "roll_sigma_deg = 1e-200\nwire = "),
+            "roll_sigma_deg: 1e-200; expected 0, which is exact, or 1e-09",
+        ),
+        (
+            ("wire = ", "uncertainty = {taper = 1e9}\nwire = "),
+            "uncertainty taper = 1000000000.0: expected a number from 0 to 3",
+        ),
+        (("wire = ", 'phantom = " "\nwire = '), "phantom: blanks alone"),
+        (("wire = ", "wall = {stiffness_N_mm2 = 1e-12}\nwire = "), "= 1e-12: expected a number from 1e-09; correct it"),
+        (
+            ("radius_mm", "torsional_stiffness_N_mm2 = 5e-324\nradius_mm"),
+            "torsional_stiffness_N_mm2 = 5e-324: expected a number from 1e-12",
+        ),
+        (("radius_mm", "torsional_stiffness_N_mm2 = 1e13\nradius_mm"), "1e+13; expected 1e+12 at most, or inf"),
         (('wire = "soft"', 'wire = "soft"\nroll_deg = "fitted"'), "did you mean 'fit'?"),
         (('wire = "soft"', 'wire = "soft"\ncalibrated = "x"'), "calibrated: unknown key; write parameters = FILE"),
         *(
@@ -110,6 +126,14 @@ def test_defaults_paths_and_order(tmp_path: Path) -> None:
 )
 def test_what_is_wrong_is_said(tmp_path: Path, change: tuple[str, str], expected: str) -> None:
     assert expected in problems(tmp_path, GOOD.replace(*change))
+
+
+@pytest.mark.parametrize(
+    "change", [('"run1"', str([1.0] * 5000)), ('= "soft"', f"= {[1.0] * 5000}"), ('"run1"', f'"{"a" * 9999}"')]
+)
+def test_what_was_found_is_cut_where_it_is_long(tmp_path: Path, change: tuple[str, str]) -> None:
+    """A list in place of an id was told whole, 25 kB."""
+    assert len(problems(tmp_path, GOOD.replace(*change))) < 600
 
 
 def test_all_problems_come_at_once(tmp_path: Path) -> None:

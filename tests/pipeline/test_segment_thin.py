@@ -83,6 +83,19 @@ def test_no_branch_is_made_of_a_vessel_that_connectedness_reaches_in_part():
     assert np.abs(off).max() < 0.1 * VOXEL
 
 
+def test_a_threshold_that_finds_more_than_the_faintest_grey_keeps_the_vessel():
+    """At 0.05 all of the scan is connected, the faintest grey ends in the tube's skirt: voxels lay outside its box."""
+    off = np.hypot(POINTS[..., 0], POINTS[..., 1])[:, :, :30] - 2.0
+    grey = phantoms.scan(100.0 + 900.0 * phantoms.partial_volume(off, VOXEL), 0.8, 20.0, 0)
+    usual, loose = (
+        segment(Volume(grey, [VOXEL] * 3, LOW), [[0.0, 0.0, -5.0]], SegmentConfig(threshold=threshold))
+        for threshold in (0.6, 0.05)
+    )
+    assert loose.counters["voxels_visited"] > 10 * usual.counters["voxels_visited"]
+    inside = loose.distance.to_index(usual.distance.to_mm(np.argwhere(usual.distance.values < -0.5 * VOXEL))).T
+    assert np.mean(map_coordinates(loose.distance.values, inside, order=1) < 0) > 0.99
+
+
 @pytest.mark.parametrize(("share", "expected"), [(0.35, True), (0.45, True), (1.0, False)])
 def test_a_branch_that_is_filled_too_little_is_said(share, expected):
     """Of 1 mm radius, filled to 35 to 50 %, two thirds of it and more were missing without a word."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,14 +12,17 @@ import pytest
 
 from pipeline.cli import main
 from pipeline.model import Clamp, Lumen, OverWire
+from pipeline.run.cache import Store
+from pipeline.run.log import Log
 from pipeline.run.stages.covered import along, too_thick
-from pipeline.run.stages.known import Frame
+from pipeline.run.stages.known import Context, Frame, Known
 from pipeline.run.stages.load import each_frame
-from pipeline.run.stages.simulate import _pressed_deep, judged
+from pipeline.run.stages.simulate import _doubtful, _pressed_deep, judged
 from pipeline.run.stages.turned_back import turned_back
 from pipeline.simulate import altered, guide_wire, insertion_of, resolution
 from pipeline.simulate.config import SimulateConfig, SolverConfig
 from pipeline.study.manifest import Case, ManifestError, read_manifest
+from pipeline.study.settings import Config
 from solver import GuideWire, Insertion, Solution, VesselWall
 from solver.grid import Grid
 
@@ -50,6 +54,16 @@ def wide_open() -> Lumen:
     """Space without a wall nearby: the rest shape shows."""
     grid = Grid(np.full((20, 20, 20), -30.0, np.float32), np.full(3, 2.0), np.full(3, -19.0))
     return Lumen(grid)
+
+
+def test_what_the_solver_doubts_of_a_lumen_is_a_warning_of_the_case(case: Case) -> None:
+    """It was a UserWarning of Python on the terminal, with a path and a line of code."""
+    axis = np.linspace(-3.0, 3.0, 21)
+    across = np.hypot(*np.meshgrid(axis, axis, indexing="ij")) - 1.5
+    tube = Grid(np.repeat(2.0 * across[..., None], 21, axis=2), [0.3] * 3, [-3.0, -3.0, 0.0])
+    known = Known(lumen=Lumen(tube), clamp=Clamp(np.zeros(3), np.array([0.0, 0.0, 1.0])))
+    (said,) = _doubtful(Context(case, Config(), Store(None), Log(lambda *_: None)), known, [])
+    assert re.match(r"simulate: the lumen's signed distance: it changes by 2 per mm", said)
 
 
 def run(case: Case, roll: float, depths: tuple[float, ...] = (6.0, 12.0)) -> list[Solution]:

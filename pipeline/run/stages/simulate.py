@@ -77,10 +77,11 @@ def _replayed(run: Context, known: Known) -> Known:
 
 
 def _doubtful(run: Context, known: Known, both: Sequence[tuple[Frame, Solution]]) -> list[str]:
-    """Warnings of simulated wires, those of frames, that have turned round, are pressed deep or find no room."""
+    """Warnings of a doubtful wall, and of frames' wires that have turned round, are pressed deep or find no room."""
     case, wall = run.case, wall_of(known.vessel.distance, run.config.solver.hull)
     untraced = {frame.index: wire.joints_mm for frame, wire in both if frame.curve is None and wire.converged}
-    said = turned_back(wall, known.held.entry_mm, untraced) + _pressed_deep(both, case.wire.radius_mm)
+    said = [f"simulate: the lumen's signed distance: {wall.doubts}"] * bool(wall.doubts)
+    said += turned_back(wall, known.held.entry_mm, untraced) + _pressed_deep(both, case.wire.radius_mm)
     said += too_thick("wire", case.wire.radius_mm, {frame.index: along(wire) for frame, wire in both}, wall)
     if case.catheter is not None:
         covered = {frame.index: along(wire, frame.catheter_mm) for frame, wire in both}

@@ -50,6 +50,12 @@ def meta_others() -> Iterator[Variant]:
     yield Variant("mha, sheared", changed(plain, ("TransformMatrix =", "0 1 0 -1 0.2 0 0 0 1")), "!sheared")
     yield Variant("mha, slope 2", changed(plain, ("ElementType", "ElementToIntensityFunctionSlope = 2\nElementType")),
                   values=2 * numbered())  # fmt: skip
+    for slope in ("0", "nan", "inf"):
+        yield Variant(
+            f"mha, slope {slope}",
+            changed(plain, ("ElementType", f"ElementToIntensityFunctionSlope = {slope}\nElementType")),
+            "!ElementToIntensityFunctionSlope",
+        )
     um = changed(plain, ("ElementSpacing =", "400 500 700"), ("Offset =", "12000 -30000 5000"),
                  ("ElementType", "DistanceUnits = um\nElementType"))  # fmt: skip
     yield Variant("mha, in um", um)
