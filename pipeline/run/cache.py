@@ -89,7 +89,9 @@ class Store:
                 temporary.write_bytes(encoded(key, result))
         except OSError as error:
             self._writable = False
-            self.warn(f"the cache keeps nothing from here on: {error.__cause__ or error}")
+            reason = getattr(error.__cause__, "strerror", None) or error
+            what = f"{self.root} cannot be written: {reason}; make room or allow writing there"
+            self.warn(f"the cache keeps nothing from here on: {what}")
 
     @staticmethod
     def _path(root: Path, stage: str, key: str) -> Path:

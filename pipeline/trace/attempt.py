@@ -94,6 +94,11 @@ class Attempt:
         """Median peak above the background over the noise of one voxel."""
         return self.tube.peak / image.noise
 
+    def brightness(self, image: Subtraction) -> str:
+        """Its ``cnr`` in words: a peak below the background, which a fit may reach, says nothing as a number."""
+        cnr = self.cnr(image)
+        return f"{cnr:.1f} noises bright" if cnr > 0 else "no brighter than what is around it"
+
 
 def _fitted(
     image: Subtraction, points: Array, cut: bool, entry: EntryPose, find_tip: bool = True, knots: float | None = None

@@ -224,11 +224,11 @@ def _of_the_line(
     thin = attempt.tube.sigma < NARROWEST * image.wall_blur_mm and not image.thick_slices
     return (
         (thin and cnr < SURE_CNR, FrameStatus.TRACE_LOW_CONTRAST,
-         f"a line of blur {attempt.tube.sigma:.2f} mm, {cnr:.1f} noises bright",
+         f"a line of blur {attempt.tube.sigma:.2f} mm, {attempt.brightness(image)}",
          f"no less than {NARROWEST:g} of the scanner's own blur, {image.wall_blur_mm:.2f} mm",
          "check that the frame shows a wire; scan with more dose; an ok frame of a smaller depth before it helps, too"),
         (cnr < least_cnr and not (confirmed and _ends_there(image, points)), FrameStatus.TRACE_LOW_CONTRAST,
-         f"{length_mm:.1f} mm of line, {cnr:.1f} noises bright",
+         f"{length_mm:.1f} mm of line, {attempt.brightness(image)}",
          f"{least_cnr:.1f} where it is so long, or the curve of the frame before, confirmed by this one",
          "check that the frame shows a wire; scan with more dose; an ok frame of a smaller depth before it helps, too"),
         (outside.mean() > MOST_OUTSIDE, FrameStatus.TRACE_LEFT_LUMEN,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 from functools import lru_cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -20,10 +21,11 @@ from pipeline.run.stages.trace import _in_plane
 from pipeline.segment import segment
 from pipeline.status import FrameStatus
 from pipeline.trace import doubts, explain, of_catheter, of_length, trace
-from pipeline.trace.attempt import EntryPose, _fitted, dense, misfit, prolonged
+from pipeline.trace.attempt import Attempt, EntryPose, _fitted, dense, misfit, prolonged
 from pipeline.trace.config import TraceConfig
 from pipeline.trace.elsewhere import DARK, brightest_line, hint_of_lines, passed_by_dark
 from pipeline.trace.knots import first_tube
+from pipeline.trace.link import Path
 from pipeline.trace.region import _regions, shows_lumen
 from pipeline.trace.rotation_plane import near_rotation_plane
 from pipeline.trace.subtraction import BLOCK, _smooth, levelled, subtracted, subtracting
@@ -588,3 +590,11 @@ def test_blocks_that_hold_nothing_are_level() -> None:
     smooth = _smooth(sums, counts)
     assert smooth[0, 0, 0] == pytest.approx(5.0)
     assert np.all(smooth[6:, 6:, 6:] == 0.0)
+
+
+@pytest.mark.parametrize(("peak", "told"), [(30.0, "3.0 noises bright"), (-5e25, "no brighter than what is around it")])
+def test_how_bright_a_line_is_makes_sense(peak: float, told: str) -> None:
+    """A fit gone wrong was "-5347310214188968479555584.0 noises bright"."""
+    none = np.zeros((0, 3))
+    attempt = Attempt(SimpleNamespace(peak=peak), Path(none, np.zeros(0, bool), 0), [], [], none)
+    assert attempt.brightness(SimpleNamespace(noise=10.0)) == told
