@@ -221,11 +221,13 @@ def trust(handle: Any, k: int, reached: tuple[float, float, float], doubtful: bo
 def way_of_joints(problem: Problem, at: Any, k: int, segment: float) -> float:
     """Largest way of a joint in this step, mm. Joints are counted from the tip: there they stay with the material.
 
-    The one at the entry is no piece of the wire: where their number changes, the next lies half a segment further on.
+    The one at the entry is no piece of the wire: where their number changes, its partner may lie half a segment further
+    on. In a catheter that was a snap of a wire that lay still; elsewhere it only asks for shorter steps, and these find
+    where friction lets go.
     """
     x, was = problem.state.x, segments_at(at.inserted, segment)[0]
-    common = min(k, was)
-    return farthest(x[CURRENT], k - common + 1, x[LAST_GOOD], was - common + 1, common)
+    common, other = min(k, was), 1 if at.next > 0.0 else 0
+    return farthest(x[CURRENT], k - common + other, x[LAST_GOOD], was - common + other, common + 1 - other)
 
 
 @merged

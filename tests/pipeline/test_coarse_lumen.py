@@ -25,4 +25,6 @@ def test_a_lumen_in_the_scans_voxels_becomes_as_coarse_as_the_scan(voxel: float)
     found = coarse_lumen(lumen, 2 * voxel).distance
     assert found.shape == (12, 12, 12)
     np.testing.assert_allclose(found.spacing_mm, 2 * voxel)
-    np.testing.assert_allclose(found.values[0, 0], found.to_mm([[0, 0, k] for k in range(12)])[:, 2] - 1.0, atol=1e-6)
+    np.testing.assert_allclose(
+        found.values[0, 0], found.to_mm([[0, 0, k] for k in range(12)])[:, 2] - 1.0, rtol=0.0, atol=1e-6
+    )

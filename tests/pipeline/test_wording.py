@@ -96,13 +96,17 @@ def test_no_wrong_setting_is_told_in_foreign_words() -> None:
         (
             "roll_deg",
             '"auto"',
-            'case \'a\' roll_deg = "auto": expected a number, a list (not empty) of numbers or "fit"; correct it, or '
-            "leave it out for 0.0",
+            "case 'a' roll_deg = \"auto\": expected a number from -100000 to 100000, a list (not empty) of numbers "
+            'from -100000 to 100000 or "fit"; correct it, or leave it out for 0.0',
         ),
         ("roll_deg", '"30"', "write it without quotes"),
-        ("roll_deg", "[]", "roll_deg = []: expected a number, a list (not empty) of numbers or"),
-        ("roll_deg", f"[{'1.0, ' * 30}true]", "case 'a' roll_deg[30] = true: expected a number, a list"),
-        ("roll_deg", "1e30", "expected a number from -1e9 to 1e9"),
+        ("roll_deg", "[]", "roll_deg = []: expected a number from -100000 to 100000, a list (not empty) of"),
+        (
+            "roll_deg",
+            f"[{'1.0, ' * 30}true]",
+            "case 'a' roll_deg[30] = true: expected a number from -100000 to 100000, a list",
+        ),
+        ("roll_deg", "1e30", "expected a number from -100000 to 100000"),
         ("role", '"validate"', "did you mean 'validation'?"),
         ("entry_mm", "[1, 2]", "entry_mm = [1, 2]: expected [number, number, number], each from -10000 to 10000"),
         ("wire", "5", "case 'a': wire 5 is not among [wires.*]; allowed: w"),

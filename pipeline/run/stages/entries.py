@@ -30,7 +30,8 @@ def _frames(known: Known) -> list[Frame]:
 
 def _entries(run: Context, known: Known) -> dict[tuple[str, str], Entry]:
     """The four entries by the names of clamp and depth; empty where one of them cannot be had or none is asked for."""
-    stated = run.case.insertion_mm is not None and run.case.frames and run.config.compare.simulated_nulls
+    wires = run.case.frames or run.case.traces
+    stated = run.case.insertion_mm is not None and wires and run.config.compare.simulated_nulls
     if not _frames(known) or not stated or known.clamp is None or run.config.simulate.entry == "manifest":
         return {}
     clamps = {"estimated": known.clamp, "manifest": manifest_clamp(run, known)[0]}
