@@ -275,3 +275,11 @@ def test_a_curve_that_a_soft_wall_yields_to_is_in_its_lumen() -> None:
     curve = Curve(points, np.full(40, np.nan))
     assert _in_lumen(curve, lumen, 2.0).status is FrameStatus.TRACE_LEFT_LUMEN
     assert _in_lumen(curve, lumen, 0.03) is curve
+
+
+def test_own_traces_have_the_four_entries(tmp_path: Path) -> None:
+    """Clamp and depth may be the manifest's there, too; the rows were missing without a word."""
+    manifest = write_study(tmp_path / "study")
+    manifest.write_text(MANIFEST.partition("entry_sigma_mm")[0], encoding="utf-8")
+    assert main(["run", str(manifest), "-o", str(tmp_path / "out"), "--until", "compare", "-q"]) == 0
+    assert len(pd.read_csv(tmp_path / "out" / "cases" / "bend" / "entries.csv")) == 4
