@@ -42,7 +42,7 @@ def _not_tiny(value: float) -> float:
 
 Sigma = Annotated[NonNegative, AfterValidator(_not_tiny)]
 """A standard deviation."""
-LogSigma = Annotated[float, Field(ge=0, le=3, allow_inf_nan=False), Number]
+LogSigma = Annotated[float, Field(ge=0, le=3, allow_inf_nan=False), Number, AfterValidator(_not_tiny)]
 """Standard deviation of a logarithm: at 3 nothing but a factor of 20 either way is known."""
 Share = Annotated[float, Field(ge=0, le=1), Number]
 Count = Annotated[int, Field(ge=0, le=10**6), Number]

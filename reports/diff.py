@@ -243,7 +243,8 @@ def _case_rows(before: pd.DataFrame, after: pd.DataFrame, tolerance: Mapping[str
             for name in columns_in(tolerance):
                 if verdict == "better" and not ERRORS[name].better:  # of a frame that failed, another depth was known
                     continue
-                if now not in GOOD and ERRORS[name].better:  # it is in no score, whatever its refused trace is off by
+                # of a frame that failed the error is in no score, whatever its refused trace was off by
+                if ERRORS[name].better and not (was in GOOD and now in GOOD):
                     continue
                 pair = (old[frame][name], new[frame][name])
                 a, b = (math.nan if pd.isna(value) else float(value) for value in pair)

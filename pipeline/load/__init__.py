@@ -96,7 +96,7 @@ def load(header: Header, box: Box | None = None, config: LoadConfig = LoadConfig
         values = plain(_read(header, (start, stop), config), header.source)
     if values.dtype.kind == "f" and values.size and not -MOST_GREY <= values.min() <= values.max() <= MOST_GREY:
         bad = int(np.size(values) - np.count_nonzero(np.abs(values) <= MOST_GREY))
-        why = f"{bad} voxels are NaN, infinite or beyond {MOST_GREY:.0e}; allowed: grey values. Replace them first."
+        why = f"{bad} voxels are NaN, infinite or beyond {MOST_GREY:.0e}; allowed: grey values up to that; replace them"
         raise unusable(header.source, why)
     made_of = Crop(header, (start, stop), config)
     origin = header.grid.to_mm(start)

@@ -96,6 +96,10 @@ class Deflated(io.RawIOBase):
         super().close()
 
 
+GZIP = b"\x1f\x8b\x08"
+"""How a gzip member begins (RFC 1952)."""
+
+
 def unpacked(path: Path, packing: str, offset: int) -> IO[bytes]:
     """The data of a file from ``offset`` on, unpacked as they are read; packing : "", "deflate" or "bzip2"."""
     file = opened(path)
@@ -105,11 +109,19 @@ def unpacked(path: Path, packing: str, offset: int) -> IO[bytes]:
     return bz2.BZ2File(file) if packing == "bzip2" else file
 
 
-def last_word(path: Path) -> int:
-    """The last four bytes of a file as a number: of a gzip file of one member, the bytes that it unpacks to."""
+def told_bytes(path: Path, offset: int) -> int | None:
+    """What a gzip file from ``offset`` on says that it unpacks to, modulo 2^32; None where a second member may follow.
+
+    That length is the last member's: a scan with another of its size behind it would pass.
+    """
     with opened(path) as file:
-        file.seek(-4, os.SEEK_END)
-        return int.from_bytes(file.read(4), "little")
+        file.seek(offset + len(GZIP))
+        before = last = b""
+        while block := file.read(1 << 20):
+            if GZIP in before + block:
+                return None
+            before, last = block[1 - len(GZIP) :], (last + block)[-4:]
+    return int.from_bytes(last, "little")
 
 
 def skip(file: IO[bytes], count: int, *, packed: bool) -> None:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pipeline.arrays.grids import unflattened
 from pipeline.model import Array, Lumen, Volume
 from pipeline.register.bent import Bent, bent
-from pipeline.register.padding import unpadded
+from pipeline.register.padding import off_the_rim, padding_in, unpadded
 from pipeline.register.patches import LEAST_MM, SPAN_RADII
 from pipeline.register.rigid import Motion, edge_mask, rigid
 from pipeline.register.shift import Fit, StaticPoints, farthest, fit_motion, look, static_points
@@ -27,7 +27,7 @@ POINTS = 4000
 """Points at the wall that the first look takes: they show a shift of 0.01 voxel at a contrast of 9 noises."""
 NEAR_VOXELS = 1.5
 """The width of a blurred wall: up to there least squares is the more exact (0.03 voxel where SimpleITK alone leaves
-0.07) and fifty times faster; beyond, SimpleITK looks first."""
+0.07) and fifty times faster; beyond, coarse fits look first."""
 CLEARLY = 0.8
 """Least squares without SimpleITK is believed where its misfit is smaller by this factor."""
 STRUCTURE_POINTS = 12000
@@ -37,6 +37,9 @@ COARSE = (4.0, 1500), (2.0, 4000)
 voxels and more, in a thirtieth of SimpleITK's time."""
 AGREES_VOXELS = 0.5
 """How far from there the fine fit may end, to be believed: where both are right they are 0.1 voxel apart."""
+HELD_VOXELS = 0.5
+"""What the wall alone still asks for, from which it is believed: the sides of a block that slid along itself, in air,
+held the vessel back by 1.6 to 2.5 voxels."""
 WALL_POINTS = 200
 """Fewer points show no motion."""
 BAND_VOXELS = 2.0
@@ -49,11 +52,12 @@ BAD_MISFIT_VOXELS = 0.6
 
 @dataclass(frozen=True, eq=False)
 class Anchor:
-    """What frames are registered to: the reference scan, and points of its lumen's wall."""
+    """What frames are registered to: the reference scan without its padding, and points of its lumen's wall."""
 
     reference: Volume
     wall: StaticPoints
     patch_mm: float
+    padding: NDArray[np.bool_] | None = None
 
     @cached_property
     def hides(self) -> bool:
@@ -63,18 +67,21 @@ class Anchor:
     @cached_property
     def edges(self) -> NDArray[np.bool_]:
         """Voxels of walls and bones; worked out for the first frame that moved."""
-        return edge_mask(self.reference, self.wall.steepness)
+        return off_the_rim(edge_mask(self.reference, self.wall.steepness), self.padding)
 
     @cached_property
     def structures(self) -> StaticPoints:
-        """Points on walls and bones, for the fit of a frame that moved."""
-        return static_points(self.reference, _thinned(self.reference, self.edges, STRUCTURE_POINTS), self.patch_mm)
+        """Points on walls and bones, for the fit of a frame that moved; of few, those at the wall."""
+        at = _thinned(self.reference, self.edges, STRUCTURE_POINTS)
+        found = static_points(self.reference, at, self.patch_mm)
+        return found if len(found.points_mm) >= WALL_POINTS else self.wall
 
     @cached_property
     def coarse(self) -> list[StaticPoints]:
-        """The same for COARSE fits, the most blurred first; one gain for all of each."""
+        """The same for COARSE fits, the most blurred first; one gain for all of each; none of few points."""
         points = [(_thinned(self.reference, self.edges, count), blur) for blur, count in COARSE]
-        return [static_points(self.reference, at, self.patch_mm, blur).in_one for at, blur in points]
+        found = [static_points(self.reference, at, self.patch_mm, blur).in_one for at, blur in points]
+        return [one for one in found if len(one.points_mm) >= WALL_POINTS]
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,7 +143,7 @@ class Registration:
 
 
 def _thinned(grid: Grid, mask: NDArray[np.bool_], count: int) -> Array:
-    """At most ``count`` of the mask's voxels, evenly taken, as LPS mm."""
+    """``count`` of the mask's voxels, or up to twice as many, evenly taken, as LPS mm."""
     flat = np.flatnonzero(mask)
     flat = flat[:: max(1, len(flat) // count)]
     return grid.to_mm(unflattened(flat, mask.shape))
@@ -144,11 +151,12 @@ def _thinned(grid: Grid, mask: NDArray[np.bool_], count: int) -> Array:
 
 def anchor(reference: Volume, lumen: Lumen) -> Anchor:
     """The wire-free scan prepared once for all frames; ``reference`` may be the crop that holds the lumen."""
-    distance, reference = lumen.distance, unpadded(reference)
+    distance, padding = lumen.distance, padding_in(reference)
+    reference = unpadded(reference, padding)
     reach = BAND_VOXELS * float(np.min(distance.spacing_mm))
     band = (distance.values < reach) & (distance.values > -reach)  # without a second box of numbers
     patch_mm = max(LEAST_MM, -SPAN_RADII * float(distance.values.min()))
-    return Anchor(reference, static_points(reference, _thinned(distance, band, POINTS), patch_mm), patch_mm)
+    return Anchor(reference, static_points(reference, _thinned(distance, band, POINTS), patch_mm), patch_mm, padding)
 
 
 def _best(frame: Volume, to: Anchor) -> Motion:
@@ -186,15 +194,13 @@ def register(frame: Volume, to: Anchor, skip_voxels: float) -> Registration:
     A motion below ``skip_voxels`` everywhere on the wall is measured and reported but not applied; nor is one after
     which the walls still do not fit (not ``trusted``).
     """
-    wall, frame = to.wall, unpadded(frame)
+    wall, frame = to.wall, unpadded(frame, padding_in(frame))
     if len(wall.points_mm) < WALL_POINTS:
         return Registration(misfit_voxels=float("inf"))
     first, _ = look(frame, wall, Motion(), skip_voxels)
     moved = farthest(first.motion, wall)
     if moved < skip_voxels and first.misfit_voxels < BAD_MISFIT_VOXELS:
         return _still(wall, first, moved)
-    if len(to.structures.points_mm) < WALL_POINTS:
-        return _in_no_place(frame, to, moved, moved, first)
     motion, structures = _best(frame, to), to.structures.in_one
     if look(frame, wall, motion)[1]:
         structures = to.structures
@@ -202,6 +208,10 @@ def register(frame: Volume, to: Anchor, skip_voxels: float) -> Registration:
     motion, loose = slid(frame, structures, motion)
     last, _ = look(frame, wall, motion)
     left = farthest(last.motion.after(motion), wall)
+    if left > HELD_VOXELS:
+        motion = fit_motion(frame, wall.in_one, motion).motion
+        last, _ = look(frame, wall, motion)
+        left = farthest(last.motion.after(motion), wall)
     if last.misfit_voxels > BAD_MISFIT_VOXELS:
         return _in_no_place(frame, to, moved, left, last)
     if (far := farthest(motion, wall)) < skip_voxels:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pipeline.model import Array
 
 TINY = 1e-18
-"""A grey that no scan's noise is below, in place of 0 where something is divided by it: some scans are in 1e-7."""
+"""A grey, or its square, in place of 0 where something is divided by it: no scan's noise is below. Some are in 1e-7."""
 PATCH_POINTS = 60
 """Points of a patch: five numbers are found from them."""
 LEAST_MM = 5.0

@@ -1,4 +1,4 @@
-"""A rigid motion of the phantom between two scans, and large ones found by SimpleITK at walls and bones."""
+"""A rigid motion of the phantom between two scans, and large ones by SimpleITK, where coarse fits find none."""
 
 from dataclasses import dataclass, field, replace
 from typing import Any

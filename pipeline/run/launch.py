@@ -166,12 +166,14 @@ def launch(plan: Plan) -> tuple[Totals, Path]:
     heads = heads_of(settings, plan.cases, plan.points)
     info |= {"sweep": heads, "swept": sorted(plan.ids) if heads else [], "until": plan.template.until}
     info |= {"stated": {case.id: stated(case) for case in plan.manifest.cases}}
-    info |= {"planned": [case.id for case in plan.manifest.cases], "doubts": among(plan.manifest.cases)}
+    info |= {"planned": [case.id for case in plan.manifest.cases]}
     info |= {"to_score": {case.id: case.frames_to_score for case in plan.manifest.cases if case.frames_to_score}}
     info |= {"fail_if": [gate.text for gate in plan.gates], **({"own": own} if (own := registered()) else {})}
     # the numbers: 1/02 is the shard 1/2
     name = "run.{}-{}.json".format(*_shard(plan.shard)) if plan.shard else "run.json"
-    info |= {"left_out": _never_asked(out / name, plan.left_out), "config": settings.as_dict()}
+    left_out = _never_asked(out / name, plan.left_out)
+    doubts = among([case for case in plan.manifest.cases if case.id not in left_out])
+    info |= {"left_out": left_out, "doubts": doubts, "config": settings.as_dict()}
     swept = (out / SWEEP.file).exists()
     guard_own(out, OVER_ALL, (job.folder for job in (*plan.jobs, *plan.sweep_jobs)))
     try:

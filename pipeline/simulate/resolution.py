@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from pipeline.arrays.polyline import at_arc
 from pipeline.model import Array, arc_length
@@ -80,7 +80,7 @@ def resolve(insert: Insert, lengths: Sequence[float]) -> Resolved:
     for shorter in lengths[1:]:
         finer = insert(shorter, True)
         moved, pushed = _moved(before, finer)
-        before = finer
+        here, before = _at_rest(before) | _at_rest(finer), finer
         if len(lengths) > 2 and _reached(finer) < _reached(wires) and not refined:
             wires, refined = insert(segment, True), True  # one depth too far, and 1 mm segments were left to all
         if len(lengths) > 2 and _reached(finer) < _reached(wires):
@@ -89,7 +89,7 @@ def resolve(insert: Insert, lengths: Sequence[float]) -> Resolved:
                 num, push = _bounds(*(4.0 * change for change in _moved(wires, finer)))
             continue
         # a wire that is about to snap goes one way or the other for tiny causes, with segments of any length
-        away = ~(moved <= AGREED_MM) & np.array([not wire.uncertain for wire in finer], dtype=bool)
+        away = here & ~(moved <= AGREED_MM) & np.array([not wire.uncertain for wire in finer], dtype=bool)
         segment, wires, refined = shorter, finer, True
         num, push = _bounds(moved, pushed)
         if not away.any():
@@ -139,5 +139,9 @@ def _bounds(moved: Array, pushed: Array) -> tuple[Array, Array]:
     return np.maximum(moved, min(near, AGREED_MM)), np.maximum(pushed, typical)
 
 
+def _at_rest(wires: Sequence[Solution]) -> NDArray[np.bool_]:
+    return np.array([wire.converged for wire in wires], dtype=bool)
+
+
 def _reached(wires: Sequence[Solution]) -> int:
-    return sum(wire.converged for wire in wires)
+    return int(np.count_nonzero(_at_rest(wires)))

@@ -260,8 +260,9 @@ def _of_two_kinds(cases: Sequence[Case]) -> list[str]:
     if not 0 < len(flat) < len(scored):
         return []
     return [
-        f"{listed(flat)}: distances in projections lack what lies along the rays, about half of a squared error; the "
-        "other cases have distances in space, and figures over all of them mix both: quote each kind alone (--only)"
+        f"case{'s' * (len(flat) > 1)} {listed(flat)}: distances in projections lack what lies along the rays, about "
+        "half of a squared error; the other cases have distances in space, and figures over all of them mix both: "
+        "quote each kind alone (--only)"
     ]
 
 

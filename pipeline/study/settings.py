@@ -84,16 +84,16 @@ def parse_assignment(text: str, source: str = "command line") -> Setting:
     name, equals, raw = text.partition("=")
     if not equals or "." not in name:
         raise SettingsError([f"{source}: {text!r} is no setting; write table.key=value, as in solver.segment_mm=0.5"])
-    if {*"\r\n"} & {*raw.strip()}:
-        why = "a line break, and what follows would be lost; write one value, and further settings with --set each"
-        raise SettingsError([f"{source}: {name.strip()} = {shortened(as_toml(raw.strip()))}: {why}"])
     try:
-        value = toml_of(f"value = {raw.strip()}", f"{source}: {name.strip()}")["value"]
+        found = toml_of(f"value = {raw.strip()}", f"{source}: {name.strip()}")
     except MalformedError:
-        value = raw.strip()
+        found = {"value": raw.strip()} | dict.fromkeys(raw.strip().splitlines()[1:])
     except UnreadableError as error:
         raise SettingsError([str(error)]) from None
-    return Setting(name.strip(), value, source)
+    if len(found) > 1:
+        why = "more than one value, and what follows would be lost; write one, and further settings with --set each"
+        raise SettingsError([f"{source}: {name.strip()} = {shortened(as_toml(raw.strip()))}: {why}"])
+    return Setting(name.strip(), found["value"], source)
 
 
 def read_settings(path: Path) -> list[Setting]:

@@ -66,7 +66,7 @@ def test_what_is_drawn_or_tried_has_to_fit_too(study: Path) -> None:
         (("--set", "solver.segment_mm=50"), "expected a number from 0.01 to 20"),
         (("--set", "solver.hull=samples:257"), "N from 1 to 256"),
         (("--set", "simulate.friction=11"), "expected a number from 0 to 10"),
-        (("--set", "segment.scale=1000"), "expected a whole number from 0 to 20"),
+        (("--set", "segment.scale=1000"), "expected a whole number from 0 to 2"),
         (("--set", "segment.least_voxels=0"), "expected a whole number from 1"),
         (("--set", "simulate.roll_offset_deg=1e9"), "expected a number from -100000 to 100000"),
     ],

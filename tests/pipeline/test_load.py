@@ -115,6 +115,7 @@ def test_what_follows_packed_voxels_is_seen_wherever_a_crop_ends(tmp_path: Path,
         b"not gzip at all": "damaged",
         bytes(600_000) + b"no padding": "damaged",
         gzip.compress(b"more"): "more than",
+        raw[begin:]: "more than",
     }
     for added, found in ends.items():
         path.write_bytes(raw + added)

@@ -478,6 +478,6 @@ def test_projections_beside_scans_are_told(tmp_path: Path) -> None:
     """Distances in a plane and in space were one rms."""
     (case,) = read_manifest(written(tmp_path, GOOD)).cases
     flat = case.model_copy(update={"id": "flat", "frames": (), "projections": tmp_path / "p.csv"})
-    assert "flat: distances in projections lack" in among([case, flat])[0]
+    assert "case flat: distances in projections lack" in among([case, flat])[0]
     assert not among([case, case])
     assert not among([flat, flat])

@@ -74,7 +74,7 @@ def test_settings_that_were_used_with_parameters_ask_for_these(tmp_path: Path) -
         ("simulate.entry=foo", '"traced" or "manifest"'),
         ("solver.segment_mm=-3", "from 0.01"),
         ("compare.sample_mm=0", "from 0.01"),
-        ("segment.threshold=1\n[load]\nmost_gib=3", 'threshold = "1\\n[load]\\nmost_gib=3": a line break'),
+        ("segment.threshold=1\n[load]\nmost_gib=3", 'threshold = "1\\n[load]\\nmost_gib=3": more than one value'),
         ("compare.simulated_nulls='1'", "expected true or false"),
         ("load.resample=-0.0", "= -0.0: expected true or false"),
         ("load.resample=yes", "expected true or false"),

@@ -63,6 +63,7 @@ def test_verdicts(change: dict[str, object], column: str, verdict: str) -> None:
         ("roll_fitted", "no_wire", "regression"),
         ("no_wire", "not_to_depth", "moved"),
         ("length_mismatch", "length_mismatch", "same"),
+        ("length_mismatch", "ok", "better"),
         ("ok", "simulated", "regression"),
         ("simulated", "ok", "better"),
     ],
