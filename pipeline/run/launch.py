@@ -172,8 +172,7 @@ def launch(plan: Plan) -> tuple[Totals, Path]:
     # the numbers: 1/02 is the shard 1/2
     name = "run.{}-{}.json".format(*_shard(plan.shard)) if plan.shard else "run.json"
     left_out = _never_asked(out / name, plan.left_out)
-    doubts = among([case for case in plan.manifest.cases if case.id not in left_out])
-    info |= {"left_out": left_out, "doubts": doubts, "config": settings.as_dict()}
+    info |= {"left_out": left_out, "doubts": among(plan.manifest.cases, left_out), "config": settings.as_dict()}
     swept = (out / SWEEP.file).exists()
     guard_own(out, OVER_ALL, (job.folder for job in (*plan.jobs, *plan.sweep_jobs)))
     try:

@@ -248,8 +248,9 @@ def doubts(cases: Sequence[Case], config: Config) -> Iterator[str]:
     yield from among(cases)
 
 
-def among(cases: Sequence[Case]) -> list[str]:
-    """What is doubtful of cases among themselves, and belongs on the page of their run."""
+def among(of_study: Sequence[Case], left_out: Sequence[str] = ()) -> list[str]:
+    """What is doubtful of cases among themselves, and belongs on the page of their run, which leaves some out."""
+    cases = [case for case in of_study if case.id not in left_out]
     return [*continued(cases), *_of_two_kinds(cases)]
 
 
