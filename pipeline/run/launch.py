@@ -161,18 +161,17 @@ def launch(plan: Plan) -> tuple[Totals, Path]:
     """Run all cases and write the files about the whole run; returns the totals and the path of its page."""
     if plan.elsewhere:
         refuse_scripts(registered())
-    out, settings, manifest = plan.out, plan.template.settings, plan.manifest.path
+    out, settings, manifest, cases = plan.out, plan.template.settings, plan.manifest.path, plan.manifest.cases
     info: dict[str, Any] = {"manifest": str(manifest), "manifest_sha256": file_hash(manifest)}
     heads = heads_of(settings, plan.cases, plan.points)
     info |= {"sweep": heads, "swept": sorted(plan.ids) if heads else [], "until": plan.template.until}
-    info |= {"stated": {case.id: stated(case) for case in plan.manifest.cases}}
-    info |= {"planned": [case.id for case in plan.manifest.cases]}
-    info |= {"to_score": {case.id: case.frames_to_score for case in plan.manifest.cases if case.frames_to_score}}
+    info |= {"stated": {case.id: stated(case) for case in cases}, "planned": [case.id for case in cases]}
+    info |= {"to_score": {case.id: case.frames_to_score for case in cases if case.frames_to_score}}
     info |= {"fail_if": [gate.text for gate in plan.gates], **({"own": own} if (own := registered()) else {})}
     # the numbers: 1/02 is the shard 1/2
     name = "run.{}-{}.json".format(*_shard(plan.shard)) if plan.shard else "run.json"
     left_out = _never_asked(out / name, plan.left_out)
-    info |= {"left_out": left_out, "doubts": among(plan.manifest.cases, left_out), "config": settings.as_dict()}
+    info |= {"left_out": left_out, "doubts": among(cases, left_out), "config": settings.as_dict()}
     swept = (out / SWEEP.file).exists()
     guard_own(out, OVER_ALL, (job.folder for job in (*plan.jobs, *plan.sweep_jobs)))
     try:
