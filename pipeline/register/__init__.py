@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pipeline.arrays.grids import unflattened
 from pipeline.model import Array, Lumen, Volume
 from pipeline.register.bent import Bent, bent
-from pipeline.register.padding import off_the_rim, padding_in, unpadded
+from pipeline.register.padding import Padding, off_the_rim, padding_in, unpadded
 from pipeline.register.patches import LEAST_MM, SPAN_RADII
 from pipeline.register.rigid import Motion, edge_mask, rigid
 from pipeline.register.shift import Fit, StaticPoints, farthest, fit_motion, look, static_points
@@ -57,7 +57,7 @@ class Anchor:
     reference: Volume
     wall: StaticPoints
     patch_mm: float
-    padding: NDArray[np.bool_] | None = None
+    padding: Padding | None = None
 
     @cached_property
     def hides(self) -> bool:
@@ -182,12 +182,6 @@ def _still(wall: StaticPoints, fit: Fit, moved: float) -> Registration:
     return Registration(moved_voxels=moved, left_voxels=moved, misfit_voxels=fit.misfit_voxels, bent=rest)
 
 
-def _in_no_place(frame: Volume, to: Anchor, moved: float, left: float, fit: Fit) -> Registration:
-    """Walls that lie in no place known, with what noise alone makes of their misfit."""
-    noise = to.wall.noise_voxels(static_points(frame, to.wall.points_mm, to.patch_mm).noise)
-    return Registration(moved_voxels=moved, left_voxels=left, misfit_voxels=fit.misfit_voxels, noise_voxels=noise)
-
-
 def register(frame: Volume, to: Anchor, skip_voxels: float) -> Registration:
     """Where the phantom lies in ``frame`` (on the reference's lattice).
 
@@ -213,7 +207,8 @@ def register(frame: Volume, to: Anchor, skip_voxels: float) -> Registration:
         last, _ = look(frame, wall, motion)
         left = farthest(last.motion.after(motion), wall)
     if last.misfit_voxels > BAD_MISFIT_VOXELS:
-        return _in_no_place(frame, to, moved, left, last)
+        noise = wall.noise_voxels(static_points(frame, wall.points_mm, to.patch_mm).noise)
+        return Registration(moved_voxels=moved, left_voxels=left, misfit_voxels=last.misfit_voxels, noise_voxels=noise)
     if (far := farthest(motion, wall)) < skip_voxels:
         return _still(wall, look(frame, wall, Motion())[0], far)
     shift, loose_mm, rest = motion.displacement_mm(wall.centre_mm), loose * wall.voxel_mm, bent(wall, last.last)

@@ -4,6 +4,7 @@ Padding of -1024 five millimetres from a vessel held a phantom that moved by 0.6
 """
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,30 +23,33 @@ RIM_VOXELS = 5
 and frames were 0.7 to 2.6 voxels off."""
 
 
-def padding_in(scan: Volume) -> NDArray[np.bool_] | None:
-    """The voxels beyond the field of view; None where there are none."""
+class Padding(NamedTuple):
+    """The voxels beyond a field of view, and the median grey of those next to them."""
+
+    where: NDArray[np.bool_]
+    beside: float
+
+
+def padding_in(scan: Volume) -> Padding | None:
+    """What lies beyond the field of view; None where nothing does."""
     values = scan.values
     darkest = values.min()
     padding = np.asarray(values == darkest)
     if not LEAST <= np.count_nonzero(padding) < padding.size - LEAST:
         return None
-    beside = _beside(scan, padding)
-    return padding if beside - darkest >= ABRUPT * (float(np.median(values[~padding])) - darkest) else None
+    beside = float(np.median(values[ndimage.binary_dilation(padding) & ~padding]))
+    abrupt = beside - darkest >= ABRUPT * (float(np.median(values[~padding])) - darkest)
+    return Padding(padding, beside) if abrupt else None
 
 
-def unpadded(scan: Volume, padding: NDArray[np.bool_] | None) -> Volume:
+def unpadded(scan: Volume, padding: Padding | None) -> Volume:
     """The scan with the grey beside its padding in place of that."""
     if padding is None:
         return scan
-    fill = np.asarray(_beside(scan, padding), scan.values.dtype)
-    return replace(scan, values=read_only(np.where(padding, fill, scan.values)), made_of=None)
+    fill = np.asarray(padding.beside, scan.values.dtype)
+    return replace(scan, values=read_only(np.where(padding.where, fill, scan.values)), made_of=None)
 
 
-def off_the_rim(edges: NDArray[np.bool_], padding: NDArray[np.bool_] | None) -> NDArray[np.bool_]:
+def off_the_rim(edges: NDArray[np.bool_], padding: Padding | None) -> NDArray[np.bool_]:
     """The edges that are no part of the rim of padding."""
-    return edges if padding is None else edges & ~ndimage.binary_dilation(padding, iterations=RIM_VOXELS)
-
-
-def _beside(scan: Volume, padding: NDArray[np.bool_]) -> float:
-    """Median grey of the voxels next to padding."""
-    return float(np.median(scan.values[ndimage.binary_dilation(padding) & ~padding]))
+    return edges if padding is None else edges & ~ndimage.binary_dilation(padding.where, iterations=RIM_VOXELS)
