@@ -13,7 +13,7 @@ from pipeline.segment._kernels.wall import PAD
 from pipeline.segment.closest import find_closest
 from pipeline.segment.config import SegmentConfig
 from pipeline.segment.labelled import distance_to_labels
-from pipeline.segment.levels import GreyLevels, failed
+from pipeline.segment.levels import GreyLevels, box_from, failed
 from pipeline.segment.surface import padded_box, prepare, signed, signed_distance
 from solver.grid import Grid
 
@@ -75,7 +75,7 @@ def lumen_from_labels(labels: Volume, config: SegmentConfig) -> Lumen:
     """Where a map of 0 and 1 is 1, its staircase evened out."""
     grid, axes = in_memory_order(labels)
     corner, padded = padded_box(np.flatnonzero(grid.values.reshape(-1) >= 0.5), grid, config.margin_mm)
-    box = tuple(slice(first, first + size - 2 * PAD) for first, size in zip(corner, padded, strict=True))
+    box = box_from(corner, np.array(padded) - 2 * PAD)
     distance = distance_to_labels(grid.values[box] >= 0.5, np.asarray(grid.spacing_mm), config.outer_mm)
     own = Grid(distance, grid.spacing_mm, grid.to_mm(corner), grid.direction)
     widest = float(grid.spacing_mm.max())

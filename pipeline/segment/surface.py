@@ -19,7 +19,7 @@ from pipeline.segment._kernels.wall import PAD, Wall, dilate, feet, mean_around,
 from pipeline.segment.blurred import blur_of_wall, half_level_offset
 from pipeline.segment.closest import find_closest
 from pipeline.segment.contact import numbered
-from pipeline.segment.levels import GreyLevels, Index, failed, grey_around, plateau, scanner_blur
+from pipeline.segment.levels import GreyLevels, Index, Vessel, failed, grey_around, plateau, scanner_blur
 from pipeline.segment.sides import BESIDE, Sides, sides_of
 from solver.grid import Array, Grid, read_only
 
@@ -67,6 +67,10 @@ class Site:
         """The box without its padding, holding nothing yet."""
         empty = np.broadcast_to(np.float32(0), [n - 2 * PAD for n in self.state.shape])
         return Grid(empty, self.volume.spacing_mm, self.volume.to_mm(self.corner), self.volume.direction)
+
+    def vessel(self, found: "SignedDistance") -> Vessel:
+        """The vessel whose wall was found here."""
+        return Vessel(self.volume, self.grid.with_values(read_only(found.values)), found.levels, self.taps)
 
 
 def padded_box(voxels: Index, grid: Grid, margin_mm: float, more: Index = NONE) -> tuple[Index, Shape]:
@@ -218,7 +222,7 @@ def wall_of(site: Site, levels: GreyLevels, outer_mm: float, wire: bool = False)
     found = signed_distance(site, levels, outer_mm)
     for _ in range(SURFACE_ROUNDS):
         own = scanner_blur(found.blur_mm, site.taps, voxel)
-        again = plateau(site.volume, site.grid.with_values(read_only(found.values)), levels, own)
+        again = plateau(site.vessel(found), own)
         thin = -float(found.values.min()) < 4 * found.blur_mm
         near = abs(again.half - levels.half) < (THIN_TOLERANCE if thin else LEVEL_TOLERANCE) * levels.contrast
         # a surface made before bone was noticed has the bone in its blur: one more round
@@ -227,8 +231,7 @@ def wall_of(site: Site, levels: GreyLevels, outer_mm: float, wire: bool = False)
         levels = again
         del found  # before the next takes its place in memory
         found = signed_distance(site, levels, outer_mm)
-    distance = site.grid.with_values(read_only(found.values))
-    sides = sides_of(site.volume, distance, site.corner, again, found.wall, wire)
+    sides = sides_of(replace(site.vessel(found), levels=again), found.wall, wire)
     if sides is not None:
         levels = again
         found = signed_distance(site, levels, outer_mm, sides)
