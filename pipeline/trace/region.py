@@ -3,7 +3,6 @@
 The grey is a reference scan's, or a model of the lumen's wall.
 """
 
-import weakref
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -16,7 +15,7 @@ from scipy.special import ndtr
 from pipeline.arrays.edges import layer_in
 from pipeline.arrays.grids import contiguous, corners_mm, in_memory_order, integer_offset, reorder, sampled, spread
 from pipeline.arrays.lattice import sparse_zeros
-from pipeline.arrays.spare import Spare
+from pipeline.arrays.spare import Last, Spare
 from pipeline.model import Lumen, Volume
 from pipeline.trace._kernels.runs import WallModel, denoised, modelled, runs_below, subtract
 from solver.grid import Grid
@@ -148,19 +147,15 @@ def _region(frame: Grid, distance: Grid) -> SearchRegion:
     return SearchRegion(box, corner, runs, axis, within, allowed.view(np.uint8), frame.shape)
 
 
-_regions: weakref.WeakKeyDictionary[Lumen, tuple[bytes, SearchRegion]] = weakref.WeakKeyDictionary()
-"""The last region of each lumen: frames share it, as it depends on the lumen and the frames' lattice alone."""
+_regions = Last[SearchRegion]()
+"""By the frames' lattice, on which they depend beside the lumen alone: frames share them."""
 
 
 def region_of(frame: Grid, lumen: Lumen, axes: tuple[int, int, int]) -> SearchRegion:
     """The region for frames of this lattice (their axes reordered by ``axes``)."""
     lattice = (frame.shape, axes, frame.spacing_mm, frame.origin_mm, frame.direction)
     key = np.concatenate([np.ravel(part) for part in lattice]).tobytes()
-    known = _regions.get(lumen)
-    if known is None or known[0] != key:
-        known = key, _region(frame, reorder(lumen.distance, axes))
-        _regions[lumen] = known
-    return known[1]
+    return _regions.of(lumen, key, lambda: _region(frame, reorder(lumen.distance, axes)))
 
 
 def shows_lumen(frame: Volume, lumen: Lumen) -> bool:
@@ -241,8 +236,8 @@ def _smoothed(reference: Volume, region: SearchRegion, lumen: Lumen, axes: tuple
     return out, scan.values[tuple((region.sample + corner).T)]
 
 
-_smoothed_of: weakref.WeakKeyDictionary[Grid, tuple[SearchRegion, Background]] = weakref.WeakKeyDictionary()
-"""The last background of each reference: frames share it, as it depends on reference and lumen's region alone."""
+_backgrounds = Last[Background]()
+"""Of references, by the region: frames share them."""
 
 
 def background_of(
@@ -256,8 +251,4 @@ def background_of(
         out = sparse_zeros(region.box.shape, np.float32)
         modelled(_wall_model(frame, region.corner, region, lumen), out)
         return out, None
-    known = _smoothed_of.get(reference)
-    if known is None or known[0] is not region:
-        known = region, _smoothed(reference, region, lumen, axes)
-        _smoothed_of[reference] = known
-    return known[1]
+    return _backgrounds.of(reference, region, lambda: _smoothed(reference, region, lumen, axes))
