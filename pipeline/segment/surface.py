@@ -103,7 +103,7 @@ def prepare(volume: Grid, order: Index, taps: NDArray[np.float32], margin_mm: fl
     state = sparse_zeros(shape, np.uint8)
     flat = into_box(order, volume, corner, shape)
     state.reshape(-1)[flat] = 1
-    dilate(state, flat, LAYERS, 2)
+    dilate(state, flat, LAYERS)
     return Site(volume, taps, corner, state, np.flatnonzero(state))
 
 

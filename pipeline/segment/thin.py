@@ -99,7 +99,7 @@ def _layers(around: Index, of: Index, shape: tuple[int, int, int], count: int) -
     """For voxels ``of`` a padded box (flat): 1 for those ``around``, 2, 3, ... in layers around them, 0 beyond."""
     state = sparse_zeros(shape, np.uint8)
     state.reshape(-1)[around] = 1
-    dilate(state, around, count, 2)
+    dilate(state, around, count)
     return np.asarray(state.reshape(-1)[of])
 
 
