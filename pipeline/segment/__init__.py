@@ -108,7 +108,7 @@ def _as_shown(
     shown, region, least = evened(grid, region, lambda filled: method(filled, seeds_mm, config))
     site = prepare(shown, region.voxels, region.taps, config.margin_mm, region.thin)
     wall = wall_of(site, region.levels, config.outer_mm, wire)
-    blur = scanner_blur(wall.blur_mm, region.taps, float(np.min(grid.spacing_mm)))
+    blur = scanner_blur(wall.blur_mm, region.taps, grid.voxel_mm)
     across = 1.0 if wall.sides is None else wall.sides.least
     return _Found(region, min(least, across), site, wall, blur, tissue=tissue)
 
@@ -185,7 +185,7 @@ def segment(
     touching, bright = side_by_side(lambda: open_ones(vessel, wall.sides is None), lambda: bone.touching(vessel))
     if len(region.thin):
         branches = thin.balls(begun, region.thin, blur)
-        thin.add_balls(wall.values, np.asarray(scan.spacing_mm), branches, config.outer_mm)
+        thin.add_balls(wall.values, scan.spacing_mm, branches, config.outer_mm)
     other = brighter(wall.levels, wire_radius_mm is not None) + bright + uneven.warning(found.least)
     said = _of_the_vessel(scan, found) + warning(touching) + _beside_it(found)
     said += other or bone.two_greys(vessel, wall.blur_mm)

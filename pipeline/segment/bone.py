@@ -32,7 +32,7 @@ GAP = 0.08
 def touching(vessel: Vessel) -> tuple[str, ...]:
     """One sentence for the report with the places where something brighter touches the wall, or none."""
     distance, levels = vessel.distance, vessel.levels
-    h = float(np.min(distance.spacing_mm))
+    h = distance.voxel_mm
     limit = levels.outside + BRIGHTER * levels.contrast
     bright = (distance.values < SEEN_VOXELS * h) & (vessel.scan.values[vessel.box] > limit)
     near = indices_of(bright)

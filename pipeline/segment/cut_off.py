@@ -19,7 +19,7 @@ STILL = 0.5
 def cut_off(vessel: Vessel) -> tuple[str, ...]:
     """One sentence for the report where the vessel's grey is cut off, or none."""
     scan, distance = vessel.scan, vessel.distance
-    h = float(np.min(distance.spacing_mm))
+    h = distance.voxel_mm
     some = np.random.default_rng(0).integers(distance.values.size, size=LOOKED_AT)
     depth, index = distance.values.reshape(-1)[some], unflattened(some, distance.values.shape) + vessel.corner
     deep, out = index[depth < -h], index[depth > FAR_VOXELS * h]

@@ -63,7 +63,7 @@ def surrounding(vessel: Vessel, blur_mm: float) -> Block | None:
     middle = 0.5 * (low + high)
     mean = ndimage.uniform_filter(np.asarray(vessel.scan.values[vessel.box], np.float32), 3)
     alike = (values < -plateau_mm) & ((mean > middle) == (at_seed > middle))
-    wall_mm = -plateau_mm - FURTHER_VOXELS * float(np.min(vessel.scan.spacing_mm))
+    wall_mm = -plateau_mm - FURTHER_VOXELS * vessel.scan.voxel_mm
     if not _lies_within(alike, values < wall_mm, seed):
         return None
     return Block(low if at_seed > middle else high, at_seed)

@@ -86,8 +86,8 @@ def _end_like(vessel: Vessel, at: Array, normal: Array) -> _Rays:
 
     That is away from the middle of the lumen around: along the vessel, however obliquely it is cut.
     """
-    spacing = np.asarray(vessel.scan.spacing_mm)
-    h = float(spacing.min())
+    spacing = vessel.scan.spacing_mm
+    h = vessel.scan.voxel_mm
     radius, rises = np.zeros(len(at)), np.arange(len(at))
     for mm in h * INWARDS:
         depth = _depth(vessel, at[rises] - mm * normal[rises])
@@ -117,7 +117,7 @@ def _end_like(vessel: Vessel, at: Array, normal: Array) -> _Rays:
 
 def _looked_out(vessel: Vessel, rays: _Rays) -> _Rays:
     """The rays that meet something that is no lumen, bright but no bone, and something dark before."""
-    h, left, gap = float(np.min(vessel.scan.spacing_mm)), np.arange(len(rays.at)), rays.gap.copy()
+    h, left, gap = vessel.scan.voxel_mm, np.arange(len(rays.at)), rays.gap.copy()
     dark = np.zeros(len(left), bool)
     for mm in h * np.arange(NEAREST, int(AHEAD_MM / h) + 1):
         there = rays.at[left] + mm * rays.normal[left]
@@ -141,7 +141,7 @@ def _part(labels: NDArray[Any], at: Array) -> NDArray[np.bool_]:
 
 def _goes_on(vessel: Vessel, rays: _Rays) -> float:
     """The radius, mm, of the vessel at an end, if what its rays meet lies in line, is as wide and as bright; or 0."""
-    spacing, gap = np.asarray(vessel.scan.spacing_mm), float(rays.gap.min())
+    spacing, gap = vessel.scan.spacing_mm, float(rays.gap.min())
     # at an oblique end no ray goes through the vessel's middle
     around = rays.radius.max() * (np.indices((13, 13, 13)).reshape(3, -1).T - 6.0) / 2.0
     radius = float(_depth(vessel, rays.at.mean(axis=0) + around / spacing).max())
@@ -179,7 +179,7 @@ def ends(vessel: Vessel, wall: tuple[Array, Array]) -> tuple[str, ...]:
 
     wall : places (n, 3) on it, mm from the scan's first voxel, and outward normals (n, 3).
     """
-    every, spacing = max(1, len(wall[0]) // PLACES), np.asarray(vessel.scan.spacing_mm)
+    every, spacing = max(1, len(wall[0]) // PLACES), vessel.scan.spacing_mm
     at, normal = (column[::every] / spacing for column in wall)
     rays, said = _looked_out(vessel, _end_like(vessel, at, normal)), []
     for _ in range(MOST_TRIED):

@@ -56,7 +56,7 @@ def lumen_from_surface(shapes: Shapes, config: SegmentConfig) -> Lumen:
     points = shapes.points_mm
     grid = _empty(points.min(0), points.max(0), config.margin_mm)
     corners = np.ascontiguousarray((points - grid.origin_mm)[shapes.triangles])
-    spacing = np.asarray(grid.spacing_mm)
+    spacing = grid.spacing_mm
     voxel = float(spacing[0])
     box = Owned(np.zeros(grid.shape, np.int32), np.zeros(grid.shape, np.uint8), spacing)
     enclosed(corners, spacing, box.inside)
@@ -76,10 +76,10 @@ def lumen_from_labels(labels: Volume, config: SegmentConfig) -> Lumen:
     grid, axes = in_memory_order(labels)
     corner, padded = padded_box(np.flatnonzero(grid.values.reshape(-1) >= 0.5), grid, config.margin_mm)
     box = box_from(corner, np.array(padded) - 2 * PAD)
-    distance = distance_to_labels(grid.values[box] >= 0.5, np.asarray(grid.spacing_mm), config.outer_mm)
+    distance = distance_to_labels(grid.values[box] >= 0.5, grid.spacing_mm, config.outer_mm)
     own = Grid(distance, grid.spacing_mm, grid.to_mm(corner), grid.direction)
     widest = float(grid.spacing_mm.max())
-    thick = widest > THICK_SLICES * float(grid.spacing_mm.min())
+    thick = widest > THICK_SLICES * grid.voxel_mm
     share, of = (SLICE_SHARE, "of its thick slices' distance") if thick else (LABELS_VOXELS, "voxel")
     note = (
         "the lumen is the given label map, its staircase evened out: of a right one the wall is known to about "

@@ -195,13 +195,13 @@ def add_necks(necks: Sequence[Array], vessel: Vessel, distance: NDArray[np.float
 
     blur_mm : the scanner's.
     """
-    grid, spacing = vessel.scan, np.asarray(vessel.scan.spacing_mm)
-    sigma, said = CREST_VOXELS * float(spacing.min()), []
+    grid, spacing = vessel.scan, vessel.scan.spacing_mm
+    sigma, said = CREST_VOXELS * grid.voxel_mm, []
     whole = float(np.hypot(blur_mm, sigma))
     for neck in necks:
         peak = values_at(Blurred(grid.values, spacing, sigma), neck * spacing)
         share = np.clip(vessel.levels.share(peak), 0.0, 0.75)
-        radius = np.maximum(whole * np.sqrt(-2.0 * np.log1p(-share)), LEAST_RADIUS * float(spacing.min()))
+        radius = np.maximum(whole * np.sqrt(-2.0 * np.log1p(-share)), LEAST_RADIUS * grid.voxel_mm)
         at = (neck - vessel.corner) * spacing
         cones(at[:-1], at[1:], radius[:-1], radius[1:], spacing, float(distance.max()), distance)
         n = int(np.argmin(radius))

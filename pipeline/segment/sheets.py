@@ -68,10 +68,10 @@ def sheets(vessel: Vessel) -> Index:
     """The voxels (flat, of the vessel's box) of sheets that may part the vessel."""
     scan, distance = vessel.scan, vessel.distance
     shape, depth = distance.shape, -distance.values.reshape(-1)
-    spacing, inner = np.asarray(distance.spacing_mm), np.flatnonzero(depth > 0)
+    spacing, inner = distance.spacing_mm, np.flatnonzero(depth > 0)
     if not len(inner):
         return inner
-    voxel = float(spacing.min())
+    voxel = distance.voxel_mm
     there = rebased(inner, shape, vessel.corner, scan.shape)
     share = vessel.levels.share(smooth_voxels(scan.values, vessel.taps, there))
     # no brighter than the plateau: beside a wire everything is dark. The level's own may be a membrane's
@@ -103,10 +103,10 @@ def _darker(grey: NDArray[np.float32], ways: list[Index], voxels: Index) -> NDAr
 
 def _parted(distance: Grid, sheet: Index) -> Grid:
     """The signed distance with sheets (flat voxels) for walls."""
-    spacing, values = np.asarray(distance.spacing_mm), distance.values.copy()
+    spacing, values = distance.spacing_mm, distance.values.copy()
     inner = np.flatnonzero(values < 0)
     tree = cKDTree(unflattened(sheet, distance.shape) * spacing)
     away = tree.query(unflattened(inner, distance.shape) * spacing, distance_upper_bound=-float(values.min()))[0]
-    depth = np.maximum(away, NEXT_TO * float(spacing.min()))
+    depth = np.maximum(away, NEXT_TO * distance.voxel_mm)
     values.reshape(-1)[inner] = np.maximum(values.reshape(-1)[inner], -depth)
     return distance.with_values(read_only(values))

@@ -112,7 +112,7 @@ def _half_level_wall(site: Site, level: float, inside: NDArray[np.uint8]) -> tup
     lattice = sparse_zeros(site.state.shape, np.float32)
     smooth_lattice(site.volume.values, site.corner, site.taps, site.state, site.near, lattice)
     voxels = surface_voxels(site.state, lattice, level, DEEP, site.near, inside)
-    spacing = np.asarray(site.volume.spacing_mm)
+    spacing = site.volume.spacing_mm
     parts = in_parts(lambda part: feet(lattice, level, spacing, part, inside), voxels)
     return voxels, Wall(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
 
@@ -182,7 +182,7 @@ def signed_distance(site: Site, levels: GreyLevels, outer_mm: float, sides: Side
 
     sides : what lies along the wall, where that is known to differ.
     """
-    spacing: Array = np.asarray(site.volume.spacing_mm)
+    spacing = site.volume.spacing_mm
     inside = sparse_zeros(site.state.shape, np.uint8)
     owner = np.full(site.state.shape, 0, np.int32)  # written to all over: in large pages, which zeros are not given
     box = Owned(owner, inside, spacing)
@@ -200,7 +200,7 @@ def signed_distance(site: Site, levels: GreyLevels, outer_mm: float, sides: Side
     own = own if own.any() else good
     blurs, whole = (0.0, np.ones(len(voxels))) if sides is None else sides.at(site.from_first(wall.foot))
     blur = blur_of_wall((wall.steepness / whole)[own], wall.curvature[own], levels.contrast)
-    wall = _corrected(wall, voxels, owner, blur, float(spacing.min()), blurs)
+    wall = _corrected(wall, voxels, owner, blur, site.volume.voxel_mm, blurs)
     inside.reshape(-1)[seen] = wall.distance[good] < 0
     visits = find_closest(box, seen, wall.foot, outer_mm)
     stray = lost_feet(box, voxels, wall.foot, good, blur * float(np.max(np.abs(blurs))))
@@ -218,7 +218,7 @@ def wall_of(site: Site, levels: GreyLevels, outer_mm: float, wire: bool = False)
 
     wire : whether the scan shows one, which is brighter than the vessel.
     """
-    voxel = float(np.min(site.volume.spacing_mm))
+    voxel = site.volume.voxel_mm
     found = signed_distance(site, levels, outer_mm)
     for _ in range(SURFACE_ROUNDS):
         own = scanner_blur(found.blur_mm, site.taps, voxel)

@@ -172,17 +172,17 @@ def _highest(points: Array, share: Array) -> NDArray[np.bool_]:
 
 def balls(vessel: Vessel, thin: Index, blur_mm: float) -> Balls:
     """Crest points of thin branches and the radii that their peaks tell. blur_mm : the scanner's."""
-    volume, spacing = vessel.scan, np.asarray(vessel.scan.spacing_mm)
-    sigma = CREST_VOXELS * float(spacing.min())
+    volume, spacing = vessel.scan, vessel.scan.spacing_mm
+    sigma = CREST_VOXELS * volume.voxel_mm
     whole = float(np.hypot(blur_mm, sigma))
     at, peak = crests(Blurred(volume.values, spacing, sigma), thin, vessel.levels.outside, SHARP / whole**2)
     share = np.clip(vessel.levels.share(peak), 0.0, 0.95)
     radius = whole * np.sqrt(-2.0 * np.log1p(-share))
     good = np.flatnonzero(share > 0)
-    good = good[_highest(at[good] / float(spacing.min()), share[good])]
+    good = good[_highest(at[good] / volume.voxel_mm, share[good])]
     # several voxels lead to one point of the crest: one ball per third of a voxel
     _, first = np.unique(np.rint(3.0 * at[good] / spacing), axis=0, return_index=True)
-    thickest = np.maximum(radius[good][first], LEAST_RADIUS * float(spacing.min()))
+    thickest = np.maximum(radius[good][first], LEAST_RADIUS * volume.voxel_mm)
     return at[good][first] - vessel.corner * spacing, thickest
 
 

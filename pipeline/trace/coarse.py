@@ -19,7 +19,7 @@ _lumens, _scans = Last[Lumen](), Last[Volume]()
 
 def times(scan: Volume) -> int:
     """How many of a scan's voxels, along each axis, are averaged into one; 1 where they are large enough, or few."""
-    voxel = float(np.min(scan.spacing_mm))
+    voxel = scan.voxel_mm
     return max(1, min(int(COARSE_MM / voxel + 1e-6), min(scan.shape) // LEAST_VOXELS))
 
 
@@ -28,7 +28,7 @@ def _means(grid: Grid, n: int) -> Grid:
     a, b, c = (s // n for s in grid.shape)
     values = grid.values[: a * n, : b * n, : c * n].reshape(a, n, b, n, c, n).mean(axis=(1, 3, 5), dtype=np.float32)
     middle = np.full(3, 0.5 * (n - 1))
-    return Grid(read_only(values), n * np.asarray(grid.spacing_mm), grid.to_mm(middle), grid.direction)
+    return Grid(read_only(values), n * grid.spacing_mm, grid.to_mm(middle), grid.direction)
 
 
 def coarse_scan(scan: Volume, n: int) -> Volume:
@@ -43,5 +43,5 @@ def coarse_scan(scan: Volume, n: int) -> Volume:
 
 def coarse_lumen(lumen: Lumen, voxel_mm: float) -> Lumen:
     """The lumen on voxels of about that size; itself where its own, which need not be the scan's, are as large."""
-    n = max(1, round(voxel_mm / float(np.min(lumen.distance.spacing_mm))))
+    n = max(1, round(voxel_mm / lumen.distance.voxel_mm))
     return lumen if n == 1 else _lumens.of(lumen, n, lambda: replace(lumen, distance=_means(lumen.distance, n)))

@@ -69,7 +69,7 @@ def passed_by_dark(frame: Volume, reference: Volume | None, entry_mm: Array) -> 
 
 def _around(frame: Volume, reference: Volume | None, entry_mm: Array) -> tuple[NDArray[np.float32], Grid]:
     """The frame's grey around the entry less the reference's, where that is seen; and the frame's part."""
-    at, spacing = frame.to_index(entry_mm[None])[0], np.asarray(frame.spacing_mm, float)
+    at, spacing = frame.to_index(entry_mm[None])[0], frame.spacing_mm
     first = np.clip(np.floor(at - REACH_MM / spacing), 0, np.array(frame.shape) - 1).astype(int)
     stop = np.clip(np.ceil(at + REACH_MM / spacing) + 1, first + 1, frame.shape).astype(int)
     box = frame.crop(first, stop)
@@ -81,7 +81,7 @@ def _around(frame: Volume, reference: Volume | None, entry_mm: Array) -> tuple[N
 
 def _nearest(grey: NDArray[np.float32], box: Grid, entry_mm: Array) -> Line | None:
     """The point of the brightest line that is nearest to the entry; None without one."""
-    spacing = np.asarray(box.spacing_mm, float)
+    spacing = box.spacing_mm
     if min(grey.shape) < 3:
         return None
     strength = _of_lines(grey, spacing)

@@ -97,7 +97,7 @@ class SearchRegion:
     @cached_property
     def inner(self) -> NDArray[np.int64]:
         """Flat indices of all voxels that are more than a voxel inside the wall."""
-        return np.flatnonzero(self.box.values < -float(np.min(self.box.spacing_mm)))
+        return np.flatnonzero(self.box.values < -self.box.voxel_mm)
 
     @cached_property
     def greys(self) -> Spare:
@@ -140,7 +140,7 @@ def _region(frame: Grid, distance: Grid) -> SearchRegion:
     box, corner = _onto(frame, distance)
     box = contiguous(box)
     # in float64: a limit rounded up to float32 may include the distances that were cut off at it
-    runs = runs_below(box.values, HALO_VOXELS * float(box.spacing_mm.min()))
+    runs = runs_below(box.values, HALO_VOXELS * box.voxel_mm)
     allowed = box.values < INSIDE_MM
     axis = np.flatnonzero(allowed)
     within = axis[:: max(1, len(axis) // SAMPLE)]
@@ -178,7 +178,7 @@ def _wall_model(
     In a wall of silicone it is two steps: with one, its outer edge counted as noise, 100 grey where it was 25. empty :
     whether the scan shows no wire.
     """
-    voxel = float(np.min(scan.spacing_mm))
+    voxel = scan.voxel_mm
     at = region.sample
     grey, distance = scan.values[tuple((at + corner).T)], region.box.values[tuple(at.T)]
     deep, out = distance < -voxel, (distance > 2 * voxel) & (distance < HALO_VOXELS * voxel)
@@ -232,7 +232,7 @@ def _smoothed(reference: Volume, region: SearchRegion, lumen: Lumen, axes: tuple
     subtract(scan.values, model, corner, region.runs, rough)
     variance = spread(rough.reshape(-1)[region.within].astype(float)) ** 2
     taps = np.exp(-0.5 * (np.arange(-2, 3) / SMOOTH_VOXELS) ** 2)
-    denoised(rough, wall, taps, HALO_VOXELS * float(np.min(scan.spacing_mm)), variance, out)
+    denoised(rough, wall, taps, HALO_VOXELS * scan.voxel_mm, variance, out)
     return out, scan.values[tuple((region.sample + corner).T)]
 
 
