@@ -196,9 +196,9 @@ def listed(names: Sequence[str], most: int = _MOST_NAMED) -> str:
     return ", ".join(names[:most]) + f" and {rest} more" * (rest > 0)
 
 
-def frames_named(which: Sequence[int | str], most: int = _MOST_FRAMES) -> str:
+def frames_named(which: Sequence[int | str]) -> str:
     """``frame 1``, ``frames 1, 2``: frames in a sentence, no more than a dozen."""
-    return f"frame{'s' * (len(which) != 1)} {listed([*map(str, which)], most)}"
+    return f"frame{'s' * (len(which) != 1)} {listed([*map(str, which)], _MOST_FRAMES)}"
 
 
 def counted(count: int, noun: str) -> str:

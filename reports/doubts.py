@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from reports.case_files import find_cases, listed, results_in, runs_in
+from reports.case_files import listed, results_in, runs_in
 from reports.records import read_json
 
 AMONG = "doubts.json"
@@ -70,17 +70,9 @@ def _rank(warning: str) -> int:
     return 1 if any(words in warning for words in AGAINST_INPUTS) else _OTHERS
 
 
-def warnings_of(folder: Path) -> list[str]:
-    """What a case was warned of; nothing of one whose result cannot be read, which is said elsewhere."""
-    try:
-        return list(read_json(folder / "result.json").get("warnings", ()))
-    except ValueError:
-        return []
-
-
 def warnings_in(out_dir: Path) -> dict[str, list[str]]:
-    """What each case below an output folder was warned of."""
-    return {case.name: warnings_of(case) for case in find_cases(out_dir)}
+    """What each case below an output folder was warned of; nothing of one whose result cannot be read."""
+    return {case: list(result.get("warnings", ())) for case, result in results_in(out_dir).items()}
 
 
 def copied_from_traces(warnings: Mapping[str, Sequence[str]]) -> str:

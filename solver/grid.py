@@ -75,6 +75,11 @@ class Grid:
         nx, ny, nz = self.values.shape
         return nx, ny, nz
 
+    @property
+    def voxel_mm(self) -> float:
+        """The shortest edge of its voxels, mm."""
+        return float(self.spacing_mm.min())
+
     def to_index(self, points_mm: ArrayLike) -> Array:
         """Continuous indices (..., 3) of LPS points (..., 3) in mm."""
         points = numbers("grid", "points_mm", points_mm, (..., 3), ANYWHERE_MM)

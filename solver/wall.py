@@ -157,7 +157,7 @@ class VesselWall:
         to_index = np.ascontiguousarray((self.distance.direction / self.distance.spacing_mm).T)
         coefficients = _padded(values)
         gap, slope = _bounds(coefficients, to_index)
-        origin, spacing = np.array(self.distance.origin_mm), float(self.distance.spacing_mm.min())
+        origin, spacing = np.array(self.distance.origin_mm), self.distance.voxel_mm
         object.__setattr__(self, "field", Field(coefficients, to_index, origin, gap, slope, spacing, marks))
 
     def _check_law(self) -> None:

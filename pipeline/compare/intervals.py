@@ -15,6 +15,7 @@ import numpy as np
 from scipy.special import stdtrit
 
 from pipeline.model import Array
+from reports.case_files import counted
 
 FEWEST, WIDE_BELOW = 3, 6
 """Fewest insertions for an interval, and the number below which it is wide, and its note says "only"."""
@@ -38,7 +39,7 @@ WITHHELD = Interval(float("nan"), float("nan"))
 
 def note(insertions: int) -> str:
     """The note on an interval over so many insertions; whether there is an interval depends on their number alone."""
-    what = f"{insertions} insertion{'s' * (insertions != 1)}"
+    what = counted(insertions, "insertion")
     if insertions < FEWEST:
         return f"interval withheld: {what}, at least {FEWEST} needed"
     return f"from {what} only" if insertions < WIDE_BELOW else f"over {what}"

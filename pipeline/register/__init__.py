@@ -153,7 +153,7 @@ def anchor(reference: Volume, lumen: Lumen) -> Anchor:
     """The wire-free scan prepared once for all frames; ``reference`` may be the crop that holds the lumen."""
     distance, padding = lumen.distance, padding_in(reference)
     reference = unpadded(reference, padding)
-    reach = BAND_VOXELS * float(np.min(distance.spacing_mm))
+    reach = BAND_VOXELS * distance.voxel_mm
     band = (distance.values < reach) & (distance.values > -reach)  # without a second box of numbers
     patch_mm = max(LEAST_MM, -SPAN_RADII * float(distance.values.min()))
     return Anchor(reference, static_points(reference, _thinned(distance, band, POINTS), patch_mm), patch_mm, padding)

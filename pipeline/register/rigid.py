@@ -94,7 +94,7 @@ def edge_mask(scan: Volume, wall_steepness: float) -> NDArray[np.bool_]:
     wall_steepness : gradient at the lumen's wall per mm, in the same blur of one voxel.
     """
     steep = ndimage.gaussian_gradient_magnitude(np.asarray(scan.values, np.float32), 1.0)
-    wall = wall_steepness * float(np.min(scan.spacing_mm))
+    wall = wall_steepness * scan.voxel_mm
     return np.asarray(steep > max(EDGE_MEDIANS * float(np.median(steep)), EDGE_SHARE * wall))
 
 
@@ -127,7 +127,7 @@ def rigid(frame: Volume, reference: Volume, edges: NDArray[np.bool_], centre_mm:
     )
     method.SetOptimizerScalesFromPhysicalShift()
     method.SetShrinkFactorsPerLevel([shrink for shrink, _ in LEVELS])
-    method.SetSmoothingSigmasPerLevel([blur * float(np.min(frame.spacing_mm)) for _, blur in LEVELS])
+    method.SetSmoothingSigmasPerLevel([blur * frame.voxel_mm for _, blur in LEVELS])
     method.SmoothingSigmasAreSpecifiedInPhysicalUnitsOn()
     start = sitk.Euler3DTransform()
     start.SetCenter(centre_mm.tolist())

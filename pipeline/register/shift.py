@@ -154,7 +154,7 @@ def static_points(
     order, starts = parted(points, patch_mm)
     points = np.ascontiguousarray(points[order])
     grid, _ = in_memory_order(reference)
-    voxel = float(np.min(grid.spacing_mm))
+    voxel = grid.voxel_mm
     field = Blurred(grid.values, grid.spacing_mm, blur_voxels * voxel)
     jets = jets_at(field, grid.to_index(points) * grid.spacing_mm)
     anywhere = unflattened(np.arange(0, grid.values.size, 1 + grid.values.size // FLAT_POINTS), grid.shape)

@@ -16,8 +16,8 @@ from pipeline.compare.config import CompareConfig
 from pipeline.compare.metrics import point_to_curve, scored
 from pipeline.compare.nulls import ANOTHER
 from pipeline.model import Array
-from pipeline.run.kin import SAME_ENTRY_MM, with_kin
-from pipeline.run.overall import Found, phantoms_of
+from pipeline.run.kin import SAME_ENTRY_MM, by_phantom, with_kin
+from pipeline.run.overall import Found
 from pipeline.run.stages.repeated import ALIKE, ONE_WIRE
 from pipeline.run.traced import Traces, compare_of, traces_of
 from reports.case_files import listed
@@ -51,12 +51,7 @@ def with_another(out: Path, found: Sequence[Found]) -> list[Found]:
 
 def of_one_phantom(found: Sequence[Found]) -> list[list[Found]]:
     """The cases of each phantom that several share."""
-    phantoms = phantoms_of(case.result for case in found)
-    kin: dict[str, list[Found]] = {}
-    for case in found:
-        if case.result.case in phantoms:
-            kin.setdefault(phantoms[case.result.case], []).append(case)
-    return [cases for cases in kin.values() if len(cases) > 1]
+    return [cases for cases in by_phantom(found) if len(cases) > 1]
 
 
 def copies(found: Sequence[Found]) -> list[str]:

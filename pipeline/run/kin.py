@@ -77,7 +77,7 @@ def told_of_kin(out: Path, found: Sequence[Found]) -> tuple[list[str], list[str]
         "state a name for each"
     ]
     bare = [_named(case, [name for name in case.result.names if not name.startswith(PLACED)]) for case in found]
-    count = len(_by_phantom(bare))
+    count = len(by_phantom(bare))
     left_out = [
         f"of {count} phantoms the first {MOST} alone were held against each other: whether wires of others lie in one "
         "place is not known; give cases into one phantom the same name for it (phantom)"
@@ -107,7 +107,7 @@ def _points(wire: Array, reach_mm: float) -> Array:
     return at_arc(wire, samples(min(reach_mm, float(arc_length(wire)[-1])), STEP_MM))
 
 
-def _by_phantom(found: Sequence[Found]) -> list[list[Found]]:
+def by_phantom(found: Sequence[Found]) -> list[list[Found]]:
     """The cases of each phantom, as far as it is known."""
     phantoms = phantoms_of(case.result for case in found)
     kin: dict[str, list[Found]] = {}
@@ -118,7 +118,7 @@ def _by_phantom(found: Sequence[Found]) -> list[list[Found]]:
 
 def _strangers(out: Path, found: Sequence[Found]) -> list[tuple[Placed, Placed]]:
     """Pairs of phantoms of which one at the least has no name; of MOST phantoms."""
-    kin = _by_phantom(found)
+    kin = by_phantom(found)
     if len(kin) < 2:
         return []
     deepest = [placed for cases in kin[:MOST] if (placed := _deepest(out, cases)) is not None]

@@ -20,7 +20,7 @@ def straightened(volume: Volume, curve_mm: Array, window: tuple[float, float]) -
     Axes: along the curve, then two directions across it, which follow it without twist.
     """
     length = float(arc_length(curve_mm)[-1])
-    across = STEP_VOXELS * float(np.min(volume.spacing_mm))
+    across = STEP_VOXELS * volume.voxel_mm
     along = max(across, length / MOST_PLANES)
     arc = np.arange(0.0, length, along)
     heading = tangents(curve_mm, arc, _AHEAD_MM)

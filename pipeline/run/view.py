@@ -146,7 +146,7 @@ def closed_surface(grid: Grid) -> tuple[Array, NDArray[np.int64]]:
     The grid is padded by one voxel, outside by as much as the edge is inside: a cut vessel ends on the outer faces of
     its last voxels.
     """
-    step = float(np.min(grid.spacing_mm))
+    step = grid.voxel_mm
     values = np.pad(np.asarray(grid.values, dtype=np.float32), 1, mode="edge")
     inner = tuple(slice(1, -1) for _ in range(3))
     outer = np.maximum(np.abs(values), _LEAST * step)

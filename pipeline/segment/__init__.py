@@ -22,14 +22,14 @@ from pipeline.segment.ends import ends
 from pipeline.segment.flat_side import flat_side
 from pipeline.segment.fuzzy import fuzzy_region
 from pipeline.segment.layered import layer_around, surrounded, with_layer_alone
-from pipeline.segment.levels import GreyLevels, Region, brighter, scanner_blur
+from pipeline.segment.levels import GreyLevels, Region, Vessel, brighter, scanner_blur
 from pipeline.segment.necks import add_necks, closed_necks
 from pipeline.segment.on_wire import beside, swallowed
 from pipeline.segment.sheets import open_ones
 from pipeline.segment.surface import SignedDistance, Site, prepare, wall_of
 from pipeline.segment.uneven import evened
 from pipeline.status import StageError
-from solver.grid import Grid, read_only
+from solver.grid import Grid
 
 __all__ = ["segment"]
 
@@ -49,14 +49,13 @@ or whose noise is less than its whole greys (14 %)."""
 
 @dataclass(frozen=True, eq=False)
 class _Found:
-    """The vessel found from seeds: the grid with its contrast evened out, its region, and its wall on the site's box.
+    """The vessel found from seeds: its region, and its wall on the site's box; the site's grid has even contrast.
 
     least : lowest share of the contrast along the vessel.  blur : the scanner's, mm.  layer : what lies around it.
     tissue : grey of what hung together with it.
     block : what surrounds it, and could not be parted from it.
     """
 
-    grid: Grid
     region: Region
     least: float
     site: Site
@@ -67,9 +66,14 @@ class _Found:
     block: Block | None = None
 
     @property
-    def distance(self) -> Grid:
-        """The signed distance from the wall, with whatever was added to the vessel so far."""
-        return self.site.grid.with_values(read_only(self.wall.values))
+    def vessel(self) -> Vessel:
+        """The vessel, with whatever was added to it so far."""
+        return self.site.vessel(self.wall)
+
+    @property
+    def as_begun(self) -> Vessel:
+        """The same with the grey levels that its voxels were found by."""
+        return replace(self.vessel, levels=self.region.levels)
 
 
 def _found(grid: Grid, seeds_mm: ArrayLike, config: SegmentConfig, wire: bool) -> _Found:
@@ -79,13 +83,13 @@ def _found(grid: Grid, seeds_mm: ArrayLike, config: SegmentConfig, wire: bool) -
     the seed may lie on a wire, which is such a part.
     """
     found = _as_shown(grid, seeds_mm, config, wire, METHOD)
-    around, levels = (grid, found.distance, found.site.corner), found.region.levels
-    layer = layer_around(*around, levels.seed)
+    vessel = replace(found.as_begun, scan=grid)
+    layer = layer_around(vessel)
     if layer is not None:
-        method = partial(METHOD, noise_left=levels.noise_left)
+        method = partial(METHOD, noise_left=vessel.levels.noise_left)
         with suppress(StageError):
-            return replace(_as_shown(with_layer_alone(layer, *around), seeds_mm, config, wire, method), layer=layer)
-    block = surrounding(*around, levels, found.wall.blur_mm)
+            return replace(_as_shown(with_layer_alone(layer, vessel), seeds_mm, config, wire, method), layer=layer)
+    block = surrounding(vessel, found.wall.blur_mm)
     if block is not None and block.grey < block.at_seed:
         method = partial(METHOD, outside=block.grey)
         with suppress(StageError):
@@ -104,21 +108,21 @@ def _as_shown(
     shown, region, least = evened(grid, region, lambda filled: method(filled, seeds_mm, config))
     site = prepare(shown, region.voxels, region.taps, config.margin_mm, region.thin)
     wall = wall_of(site, region.levels, config.outer_mm, wire)
-    blur = scanner_blur(wall.blur_mm, region.taps, float(np.min(grid.spacing_mm)))
+    blur = scanner_blur(wall.blur_mm, region.taps, grid.voxel_mm)
     across = 1.0 if wall.sides is None else wall.sides.least
-    return _Found(shown, region, min(least, across), site, wall, blur, tissue=tissue)
+    return _Found(region, min(least, across), site, wall, blur, tissue=tissue)
 
 
 def _around_wire(grid: Grid, found: _Found, seeds_mm: ArrayLike, config: SegmentConfig, wire_mm: float) -> _Found:
     """The vessel around the wire, where what was found is a wire of radius ``wire_mm``; otherwise what was found."""
-    seed = beside(grid, found.distance, np.asarray(seeds_mm, float), wire_mm, found.blur)
+    seed = beside(grid, found.vessel.distance, np.asarray(seeds_mm, float), wire_mm, found.blur)
     if seed is None:
         return found
     try:
-        vessel = _found(grid, seed, config, wire=True)
+        around = _found(grid, seed, config, wire=True)
     except StageError:  # nothing but tissue around it
         return found
-    return vessel if swallowed(found.distance, vessel.distance) else found
+    return around if swallowed(found.vessel.distance, around.vessel.distance) else found
 
 
 def _beside_wire(grid: Grid, seeds_mm: ArrayLike, config: SegmentConfig, wire_mm: float | None) -> _Found:
@@ -148,16 +152,18 @@ def _levels(found: _Found, *, unsure: bool) -> dict[str, float]:
 
 def _of_the_vessel(scan: Grid, found: _Found) -> tuple[str, ...]:
     """Sentences on what surrounds it, and fills it."""
-    layer = () if found.layer is None else (surrounded(found.layer, float(np.mean(found.grid.spacing_mm))),)
+    layer = () if found.layer is None else (surrounded(found.layer, float(np.mean(scan.spacing_mm))),)
     tissue = leaked.warning(found.tissue, found.region.levels.inside)
     block = () if found.block is None else (found.block.warning,)
     sides = () if found.wall.sides is None else found.wall.sides.warning()
-    return layer + tissue + block + sides + cut_off(scan, found.distance, found.site.corner) + flat_side(found.distance)
+    vessel = replace(found.vessel, scan=scan)
+    return layer + tissue + block + sides + cut_off(vessel) + flat_side(vessel.distance)
 
 
 def _beside_it(found: _Found) -> tuple[str, ...]:
     """Sentences on vessels that pass by, and on branches that are left out."""
-    return valley.warning(found.grid, found.region.passing) + thin.warning(found.grid, found.region.faint)
+    scan, region = found.site.volume, found.region
+    return valley.warning(scan, region.passing) + thin.warning(scan, region.faint)
 
 
 def segment(
@@ -175,23 +181,19 @@ def segment(
     config = config or SegmentConfig()
     scan, axes = in_memory_order(volume)
     found = _beside_wire(scan, seeds_mm, config, wire_radius_mm)
-    grid, region, site, wall, blur = found.grid, found.region, found.site, found.wall, found.blur
-    boxed = grid, found.distance, site.corner, wall.levels
-    touching, bright = side_by_side(
-        lambda: open_ones(*boxed, region.taps, wall.sides is None), lambda: bone.touching(*boxed)
-    )
+    region, wall, blur, vessel, begun = found.region, found.wall, found.blur, found.vessel, found.as_begun
+    touching, bright = side_by_side(lambda: open_ones(vessel, wall.sides is None), lambda: bone.touching(vessel))
     if len(region.thin):
-        branches = thin.balls(grid, region.thin, site.corner, region.levels, blur)
-        thin.add_balls(wall.values, np.asarray(grid.spacing_mm), branches, config.outer_mm)
+        branches = thin.balls(begun, region.thin, blur)
+        thin.add_balls(wall.values, scan.spacing_mm, branches, config.outer_mm)
     other = brighter(wall.levels, wire_radius_mm is not None) + bright + uneven.warning(found.least)
     said = _of_the_vessel(scan, found) + warning(touching) + _beside_it(found)
-    said += other or bone.two_greys(*boxed, wall.blur_mm)
-    box = wall.values, site.corner
-    said += add_necks(region.necks, box, grid, region.levels, blur)
-    said += add_necks(closed_necks(*box, grid, config.least_voxels), box, grid, region.levels, blur)
-    said += ends(grid, found.distance, site.corner, wall.levels, wall.wall, region.taps)
+    said += other or bone.two_greys(vessel, wall.blur_mm)
+    said += add_necks(region.necks, begun, wall.values, blur)
+    said += add_necks(closed_necks(begun, config.least_voxels), begun, wall.values, blur)
+    said += ends(vessel, wall.wall)
     return Lumen(
-        reorder(found.distance, axes), wall.levels.half, said,
+        reorder(vessel.distance, axes), wall.levels.half, said,
         {**region.counters, **wall.counters, "touching_places": float(len(touching))},
         _levels(found, unsure=wire_radius_mm is not None or _few_greys(scan, region.levels)),
         known_with_place(volume),

@@ -11,8 +11,7 @@ from scipy import ndimage
 from pipeline.arrays.grids import indices_of, spelt
 from pipeline.segment.contact import Contact, how_many, named
 from pipeline.segment.groups import two_groups
-from pipeline.segment.levels import BRIGHTER, GreyLevels, Index, box_from, grey_around
-from solver.grid import Grid
+from pipeline.segment.levels import BRIGHTER, Vessel
 
 SEEN_VOXELS = 5.0
 """How far outside the wall bright voxels are looked for."""
@@ -30,18 +29,15 @@ GAP = 0.08
 """Least share of the contrast between two groups of greys that are two plateaus, apart by Ashman's D as well."""
 
 
-def touching(scan: Grid, distance: Grid, corner: Index, levels: GreyLevels) -> tuple[str, ...]:
-    """One sentence for the report with the places where something brighter touches the wall, or none.
-
-    distance : signed distance on the vessel's box, which begins at ``corner`` of the scan.
-    """
-    h = float(np.min(distance.spacing_mm))
+def touching(vessel: Vessel) -> tuple[str, ...]:
+    """One sentence for the report with the places where something brighter touches the wall, or none."""
+    distance, levels = vessel.distance, vessel.levels
+    h = distance.voxel_mm
     limit = levels.outside + BRIGHTER * levels.contrast
-    box = box_from(corner, distance.shape)
-    bright = (distance.values < SEEN_VOXELS * h) & (scan.values[box] > limit)
+    bright = (distance.values < SEEN_VOXELS * h) & (vessel.scan.values[vessel.box] > limit)
     near = indices_of(bright)
     # most voxels above the limit are noise: without them the rest lies in a far smaller box
-    surely = grey_around(scan, near + corner) > limit + SIGMAS * levels.noise / np.sqrt(27.0)
+    surely = vessel.grey_around(near) > limit + SIGMAS * levels.noise / np.sqrt(27.0)
     bright[tuple(near.T)], near = surely, near[surely]
     if len(near) == 0:
         return ()
@@ -72,22 +68,21 @@ def _places(bright: NDArray[np.bool_], at_wall: NDArray[np.bool_]) -> list[tuple
     return [(len(g), g.mean(axis=0)) for g in groups if len(g)]
 
 
-def two_greys(scan: Grid, distance: Grid, corner: Index, levels: GreyLevels, blur_mm: float) -> tuple[str, ...]:
+def two_greys(vessel: Vessel, blur_mm: float) -> tuple[str, ...]:
     """One sentence for the report where the vessel has two greys, well apart, or none.
 
     The deep voxels are split and judged by ``two_groups``. blur_mm : the wall's.
     """
-    deep = indices_of(distance.values < -DEEP * blur_mm)
-    deep = deep[:: max(1, len(deep) // LOOKED_AT)]
+    deep = vessel.deep(DEEP * blur_mm, LOOKED_AT)
     if len(deep) < LEAST:
         return ()
-    grey = (grey_around(scan, deep + corner) - levels.outside) / levels.contrast
+    grey = vessel.levels.share(vessel.grey_around(deep))
     kept = grey < BRIGHTER * np.median(grey)  # what is brighter is looked for by ``touching``, and may be a wire
     deep, grey = deep[kept], grey[kept]
     bright, low, high, apart = two_groups(grey)
     if not high - low >= max(GAP, apart):
         return ()
-    at = f"[{spelt(distance.to_mm(np.median(deep[bright], axis=0)))}]"
+    at = f"[{spelt(vessel.distance.to_mm(np.median(deep[bright], axis=0)))}]"
     share, more = 100 * np.mean(bright), 100 * (high / low - 1)
     return (
         f"segment: the vessel has two greys: {share:.0f} % of its depth are {more:.0f} % brighter than the rest, at "

@@ -114,7 +114,7 @@ def contacts(distance: Grid, least_area: float = 0.0) -> tuple[Contact, ...]:
     distance : signed distance, mm, negative inside; C-contiguous.  least_area : of an opening, over the square of the
     vessel's radius.
     """
-    values, spacing = distance.values, np.asarray(distance.spacing_mm)
+    values, spacing = distance.values, distance.spacing_mm
     inner, voxels = inside_of(values)
     if len(inner) == 0:
         return ()
@@ -122,7 +122,7 @@ def contacts(distance: Grid, least_area: float = 0.0) -> tuple[Contact, ...]:
     thick = thickness(voxels, depth, spacing)
     core = depth >= CORE * thick
     cores = along_cores(voxels, core)
-    voxel = float(spacing.min())
+    voxel = distance.voxel_mm
     owner = nearest_core(voxels, _vessels_only(core, cores, thick, voxel))
     found = meetings(voxels, owner, cores, np.ceil(FAR * thick / voxel).astype(np.int32))
     if len(found) < LEAST_FACES:

@@ -4,8 +4,7 @@ import numpy as np
 
 from pipeline.arrays.grids import unflattened
 from pipeline.segment.bone import LEAST
-from pipeline.segment.levels import Index
-from solver.grid import Grid
+from pipeline.segment.levels import Vessel
 
 AT_TOP = 0.5
 """Share of the vessel's depth with one grey, from which the level inside is that one, and not the vessel's."""
@@ -17,14 +16,12 @@ STILL = 0.5
 """Share of voxels out there that are what the next one is, from which a scan has no noise: its vessel may be flat."""
 
 
-def cut_off(scan: Grid, distance: Grid, corner: Index) -> tuple[str, ...]:
-    """One sentence for the report where the vessel's grey is cut off, or none.
-
-    distance : signed distance on the vessel's box, which begins at ``corner`` of the scan.
-    """
-    h = float(np.min(distance.spacing_mm))
+def cut_off(vessel: Vessel) -> tuple[str, ...]:
+    """One sentence for the report where the vessel's grey is cut off, or none."""
+    scan, distance = vessel.scan, vessel.distance
+    h = distance.voxel_mm
     some = np.random.default_rng(0).integers(distance.values.size, size=LOOKED_AT)
-    depth, index = distance.values.reshape(-1)[some], unflattened(some, distance.values.shape) + corner
+    depth, index = distance.values.reshape(-1)[some], unflattened(some, distance.values.shape) + vessel.corner
     deep, out = index[depth < -h], index[depth > FAR_VOXELS * h]
     grey, beside = (
         scan.values[tuple(np.minimum(out + step, np.array(scan.shape) - 1).T)] for step in ([0, 0, 0], [0, 0, 1])

@@ -12,14 +12,11 @@ from numpy.typing import NDArray
 from scipy import ndimage
 from skimage.segmentation import find_boundaries
 
-from pipeline.arrays.grids import spread, unflattened
-from pipeline.segment.bone import DEEP
+from pipeline.arrays.grids import spread
+from pipeline.segment.bone import DEEP, LEAST, LOOKED_AT
 from pipeline.segment.groups import two_groups
-from pipeline.segment.levels import GreyLevels, Index, box_from, grey_around
-from solver.grid import Grid
+from pipeline.segment.levels import Vessel
 
-LOOKED_AT, LEAST = 20_000, 100
-"""Voxels below the wall that are looked at, and the least of a part that tell anything."""
 CLEAR = 8.0
 """Spreads of a block's greys by which the seed is brighter: a vessel that is brightest in its middle reaches 4."""
 GAP = 0.04
@@ -47,28 +44,27 @@ class Block(NamedTuple):
         )
 
 
-def surrounding(grid: Grid, distance: Grid, corner: Index, levels: GreyLevels, blur_mm: float) -> Block | None:
-    """What a segmented vessel holds around the true one; None where it holds the vessel alone.
+def surrounding(vessel: Vessel, blur_mm: float) -> Block | None:
+    """What a segmented vessel, whose seed has the true one's grey, holds around that; None where it holds that alone.
 
-    distance : signed, mm, from the wall that was found, on a box that begins at ``corner`` of the scan.  levels : of
-    what was found, whose seed has the vessel's grey.  blur_mm : the wall's.
+    blur_mm : the wall's.
     """
-    values, plateau_mm = distance.values, DEEP * blur_mm
-    deep = np.flatnonzero(values < -plateau_mm)
+    levels, values, plateau_mm = vessel.levels, vessel.distance.values, DEEP * blur_mm
+    deep = vessel.deep(plateau_mm, LOOKED_AT)
     if levels.seed is None or len(deep) < LEAST:
         return None
-    index = unflattened(deep[:: max(1, len(deep) // LOOKED_AT)], distance.shape)
-    grey, at_seed = grey_around(grid, index + corner), float(grey_around(grid, np.array([levels.seed]))[0])
+    seed = np.array(levels.seed) - vessel.corner
+    grey, at_seed = vessel.grey_around(deep), float(vessel.grey_around(seed[None])[0])
     bright, low, high, apart = two_groups(grey)
     if at_seed > 0.5 * (low + high):  # a thin vessel has no plateau of its own
         high, apart = at_seed, CLEAR * spread(grey[~bright])
     if not high - low >= max(apart, GAP * levels.contrast):
         return None
     middle = 0.5 * (low + high)
-    mean = ndimage.uniform_filter(np.asarray(grid.values[box_from(corner, distance.shape)], np.float32), 3)
+    mean = ndimage.uniform_filter(np.asarray(vessel.scan.values[vessel.box], np.float32), 3)
     alike = (values < -plateau_mm) & ((mean > middle) == (at_seed > middle))
-    wall_mm = -plateau_mm - FURTHER_VOXELS * float(np.min(grid.spacing_mm))
-    if not _lies_within(alike, values < wall_mm, np.array(levels.seed) - corner):
+    wall_mm = -plateau_mm - FURTHER_VOXELS * vessel.scan.voxel_mm
+    if not _lies_within(alike, values < wall_mm, seed):
         return None
     return Block(low if at_seed > middle else high, at_seed)
 

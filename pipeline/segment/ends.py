@@ -13,9 +13,9 @@ from scipy import ndimage
 from pipeline.arrays.grids import spelt
 from pipeline.arrays.jets import smooth_voxels
 from pipeline.arrays.polyline import across
-from pipeline.segment.levels import BRIGHTER, GreyLevels, Index
+from pipeline.segment.levels import BRIGHTER, Index, Vessel
 from pipeline.segment.necks import runs_along
-from solver.grid import Array, Grid
+from solver.grid import Array
 
 AHEAD_MM = 6.0
 """Longest gap: the shadow of a clip or a coil is a few mm wide."""
@@ -47,27 +47,18 @@ MOST_TRIED = 8
 """Ends that are looked at."""
 
 
-class _Scene(NamedTuple):
-    """The scan, the signed distance and the voxel at which its box begins, grey levels, and smoothing."""
+def _depth(vessel: Vessel, at: Array) -> Array:
+    """Depth below the wall (...) mm at places (..., 3), voxels of the scan; negative outside, and off the box."""
+    held, flat = _flat(at - vessel.corner, vessel.distance.shape)
+    return np.where(held, -vessel.distance.values.reshape(-1)[flat], -np.inf)
 
-    scan: Grid
-    distance: NDArray[np.float32]
-    corner: Index
-    levels: GreyLevels
-    taps: NDArray[np.float32]
 
-    def depth(self, at: Array) -> Array:
-        """Depth below the wall (...) mm at places (..., 3), voxels of the scan; negative outside, and off the box."""
-        held, flat = _flat(at - self.corner, self.distance.shape)
-        return np.where(held, -self.distance.reshape(-1)[flat], -np.inf)
-
-    def grey(self, at: Array) -> Array:
-        """Smoothed grey (n,) at places (n, 3), voxels, over the contrast; 0 off the scan."""
-        held, flat = _flat(at, self.scan.shape)
-        share = np.zeros(len(at))
-        grey = smooth_voxels(self.scan.values, self.taps, flat[held])
-        share[held] = (grey - self.levels.outside) / self.levels.contrast
-        return share
+def _grey(vessel: Vessel, at: Array) -> Array:
+    """Smoothed grey (n,) at places (n, 3), voxels, over the contrast; 0 off the scan."""
+    held, flat = _flat(at, vessel.scan.shape)
+    share = np.zeros(len(at))
+    share[held] = vessel.levels.share(smooth_voxels(vessel.scan.values, vessel.taps, flat[held]))
+    return share
 
 
 def _flat(at: Array, shape: tuple[int, ...]) -> tuple[NDArray[np.bool_], Index]:
@@ -90,30 +81,30 @@ class _Rays(NamedTuple):
         return _Rays(*(column[kept] for column in self))
 
 
-def _end_like(scene: _Scene, at: Array, normal: Array) -> _Rays:
+def _end_like(vessel: Vessel, at: Array, normal: Array) -> _Rays:
     """The places that are no flank (nowhere does the lumen go on to both sides of them), and which way they look.
 
     That is away from the middle of the lumen around: along the vessel, however obliquely it is cut.
     """
-    spacing = np.asarray(scene.scan.spacing_mm)
-    h = float(spacing.min())
+    spacing = vessel.scan.spacing_mm
+    h = vessel.scan.voxel_mm
     radius, rises = np.zeros(len(at)), np.arange(len(at))
     for mm in h * INWARDS:
-        depth = scene.depth(at[rises] - mm * normal[rises])
+        depth = _depth(vessel, at[rises] - mm * normal[rises])
         rises = rises[depth > 0.8 * mm - h]
         radius[rises] = np.maximum(radius[rises], depth[depth > 0.8 * mm - h])
-    room = np.min(np.minimum(at, np.array(scene.scan.shape) - 1.0 - at) * spacing, axis=1)
+    room = np.min(np.minimum(at, np.array(vessel.scan.shape) - 1.0 - at) * spacing, axis=1)
     left = np.flatnonzero((radius >= h) & (room > FLANK * radius + h))
     mm = normal * spacing
     u, v = np.moveaxis(across(mm), 1, 0)
     low = at - (BELOW * radius)[:, None] * normal
     for turn in np.pi * TURNS:
         aside = (FLANK * radius[left])[:, None] * (np.cos(turn) * u[left] + np.sin(turn) * v[left]) / spacing
-        left = left[(scene.depth(low[left] + aside) < 0) | (scene.depth(low[left] - aside) < 0)]
+        left = left[(_depth(vessel, low[left] + aside) < 0) | (_depth(vessel, low[left] - aside) < 0)]
     ball = (np.indices((5, 5, 5)).reshape(3, -1).T - 2.0) / 2.3
     ball = ball[np.linalg.norm(ball, axis=1) <= 1.0]
     around = REACHES * radius[left, None, None] * ball
-    depth = scene.depth(at[left, None] + around / spacing)
+    depth = _depth(vessel, at[left, None] + around / spacing)
     heading = -np.einsum("nb,nbx->nx", depth > 0, around)
     heading /= np.maximum(np.linalg.norm(heading, axis=1), 1e-9)[:, None]
     radius = np.maximum(radius[left], depth.max(axis=1, initial=0.0))
@@ -124,19 +115,19 @@ def _end_like(scene: _Scene, at: Array, normal: Array) -> _Rays:
     return both.of(both.radius >= LEAST_RADIUS * h)
 
 
-def _looked_out(scene: _Scene, rays: _Rays) -> _Rays:
+def _looked_out(vessel: Vessel, rays: _Rays) -> _Rays:
     """The rays that meet something that is no lumen, bright but no bone, and something dark before."""
-    h, left, gap = float(np.min(scene.scan.spacing_mm)), np.arange(len(rays.at)), rays.gap.copy()
+    h, left, gap = vessel.scan.voxel_mm, np.arange(len(rays.at)), rays.gap.copy()
     dark = np.zeros(len(left), bool)
     for mm in h * np.arange(NEAREST, int(AHEAD_MM / h) + 1):
         there = rays.at[left] + mm * rays.normal[left]
-        share, own = scene.grey(there), scene.depth(there) > -NEAREST * h
+        share, own = _grey(vessel, there), _depth(vessel, there) > -NEAREST * h
         dark[left] |= share < DARK
         lit = (share > 0.5) & dark[left]
         gap[left[lit & ~own]] = mm
         left = left[~(own | lit)]
     rays = rays._replace(gap=gap).of(np.isfinite(gap))
-    beyond = [scene.grey(rays.at + (rays.gap + n * h)[:, None] * rays.normal) for n in WITHIN]
+    beyond = [_grey(vessel, rays.at + (rays.gap + n * h)[:, None] * rays.normal) for n in WITHIN]
     return rays.of(np.mean(beyond, axis=0) < BRIGHTER)
 
 
@@ -148,18 +139,18 @@ def _part(labels: NDArray[Any], at: Array) -> NDArray[np.bool_]:
     return np.asarray(labels == most)
 
 
-def _goes_on(scene: _Scene, rays: _Rays) -> float:
+def _goes_on(vessel: Vessel, rays: _Rays) -> float:
     """The radius, mm, of the vessel at an end, if what its rays meet lies in line, is as wide and as bright; or 0."""
-    spacing, gap = np.asarray(scene.scan.spacing_mm), float(rays.gap.min())
+    spacing, gap = vessel.scan.spacing_mm, float(rays.gap.min())
     # at an oblique end no ray goes through the vessel's middle
     around = rays.radius.max() * (np.indices((13, 13, 13)).reshape(3, -1).T - 6.0) / 2.0
-    radius = float(scene.depth(rays.at.mean(axis=0) + around / spacing).max())
+    radius = float(_depth(vessel, rays.at.mean(axis=0) + around / spacing).max())
     middle = np.mean(rays.at + 0.5 * rays.gap[:, None] * rays.normal, axis=0)
     step = (0.5 * gap + AROUND * radius) / HALF
     ball = np.moveaxis(np.indices((2 * HALF + 1,) * 3), 0, -1) - HALF
     held = np.linalg.norm(ball, axis=-1) <= HALF
     at, depth, grey = middle + ball[held] * step / spacing, np.zeros(held.shape), np.zeros(held.shape)
-    depth[held], grey[held] = scene.depth(at) / step, scene.grey(at)
+    depth[held], grey[held] = _depth(vessel, at) / step, _grey(vessel, at)
     first, other = (
         (rays.at + mm[:, None] * rays.normal - middle) * spacing / step
         for mm in (-0.5 * rays.radius, rays.gap + 0.5 * rays.radius)
@@ -183,26 +174,22 @@ def _goes_on(scene: _Scene, rays: _Rays) -> float:
     return radius * step if all(runs_along(part, np.zeros(3), way) for part in (here, there)) else 0.0
 
 
-def ends(
-    scan: Grid, distance: Grid, corner: Index, levels: GreyLevels, wall: tuple[Array, Array], taps: NDArray[np.float32]
-) -> tuple[str, ...]:
+def ends(vessel: Vessel, wall: tuple[Array, Array]) -> tuple[str, ...]:
     """One sentence for the report for each place where the lumen ends and its vessel goes on.
 
-    distance : signed distance on the vessel's box, which begins at ``corner`` of the scan.  wall : places (n, 3) on it,
-    mm from the scan's first voxel, and outward normals (n, 3).  taps : the smoothing in which the vessel was found.
+    wall : places (n, 3) on it, mm from the scan's first voxel, and outward normals (n, 3).
     """
-    every, spacing = max(1, len(wall[0]) // PLACES), np.asarray(scan.spacing_mm)
-    scene = _Scene(scan, distance.values, corner, levels, taps)
+    every, spacing = max(1, len(wall[0]) // PLACES), vessel.scan.spacing_mm
     at, normal = (column[::every] / spacing for column in wall)
-    rays, said = _looked_out(scene, _end_like(scene, at, normal)), []
+    rays, said = _looked_out(vessel, _end_like(vessel, at, normal)), []
     for _ in range(MOST_TRIED):
         if not len(rays.at):
             break
         n = int(np.argmin(rays.gap))
         near = np.linalg.norm((rays.at - rays.at[n]) * spacing, axis=1) < 2.0 * rays.radius[n]
-        radius = _goes_on(scene, rays.of(near))
+        radius = _goes_on(vessel, rays.of(near))
         if radius:
-            said.append(_said(scan.to_mm(rays.at[near].mean(axis=0)), float(rays.gap[n])))
+            said.append(_said(vessel.scan.to_mm(rays.at[near].mean(axis=0)), float(rays.gap[n])))
             near = np.linalg.norm((rays.at - rays.at[n]) * spacing, axis=1) < AROUND * radius
         rays = rays.of(~near)
     return tuple(said)

@@ -20,7 +20,7 @@ vessels filled half or three quarters it is 0.18 to 0.3 and 3 to 4 times."""
 
 def flat_side(distance: Grid) -> tuple[str, ...]:
     """One sentence for the report where a wall is flat on one side, or none. distance : signed, mm."""
-    near = np.abs(distance.values) < NEAR_VOXELS * float(np.min(distance.spacing_mm))
+    near = np.abs(distance.values) < NEAR_VOXELS * distance.voxel_mm
     _, normals = normals_at(distance, near, LOOKED_AT)
     if not len(normals):
         return ()

@@ -13,7 +13,7 @@ from pipeline.segment._kernels.wall import PAD
 from pipeline.segment.closest import find_closest
 from pipeline.segment.config import SegmentConfig
 from pipeline.segment.labelled import distance_to_labels
-from pipeline.segment.levels import GreyLevels, failed
+from pipeline.segment.levels import GreyLevels, box_from, failed
 from pipeline.segment.surface import padded_box, prepare, signed, signed_distance
 from solver.grid import Grid
 
@@ -56,7 +56,7 @@ def lumen_from_surface(shapes: Shapes, config: SegmentConfig) -> Lumen:
     points = shapes.points_mm
     grid = _empty(points.min(0), points.max(0), config.margin_mm)
     corners = np.ascontiguousarray((points - grid.origin_mm)[shapes.triangles])
-    spacing = np.asarray(grid.spacing_mm)
+    spacing = grid.spacing_mm
     voxel = float(spacing[0])
     box = Owned(np.zeros(grid.shape, np.int32), np.zeros(grid.shape, np.uint8), spacing)
     enclosed(corners, spacing, box.inside)
@@ -75,11 +75,11 @@ def lumen_from_labels(labels: Volume, config: SegmentConfig) -> Lumen:
     """Where a map of 0 and 1 is 1, its staircase evened out."""
     grid, axes = in_memory_order(labels)
     corner, padded = padded_box(np.flatnonzero(grid.values.reshape(-1) >= 0.5), grid, config.margin_mm)
-    box = tuple(slice(first, first + size - 2 * PAD) for first, size in zip(corner, padded, strict=True))
-    distance = distance_to_labels(grid.values[box] >= 0.5, np.asarray(grid.spacing_mm), config.outer_mm)
+    box = box_from(corner, np.array(padded) - 2 * PAD)
+    distance = distance_to_labels(grid.values[box] >= 0.5, grid.spacing_mm, config.outer_mm)
     own = Grid(distance, grid.spacing_mm, grid.to_mm(corner), grid.direction)
     widest = float(grid.spacing_mm.max())
-    thick = widest > THICK_SLICES * float(grid.spacing_mm.min())
+    thick = widest > THICK_SLICES * grid.voxel_mm
     share, of = (SLICE_SHARE, "of its thick slices' distance") if thick else (LABELS_VOXELS, "voxel")
     note = (
         "the lumen is the given label map, its staircase evened out: of a right one the wall is known to about "

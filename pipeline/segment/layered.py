@@ -9,7 +9,7 @@ import numpy as np
 
 from pipeline.arrays.edges import EVERY, Layer, layer_in
 from pipeline.arrays.grids import unflattened
-from pipeline.segment.levels import Index, box_from, grey_around
+from pipeline.segment.levels import Vessel, grey_around
 from solver.grid import Grid
 
 REACH = 8.5, 6.0
@@ -20,17 +20,18 @@ MOVED = 0.3
 """Voxels by which the inner edge must lie inside the wall that was found; segmentation is right to 0.1."""
 
 
-def layer_around(grid: Grid, distance: Grid, corner: Index, seed: tuple[int, ...] | None) -> Layer | None:
+def layer_around(vessel: Vessel) -> Layer | None:
     """The layer between a vessel and what surrounds it, where the wall that was found lies in it; None elsewhere.
 
-    distance : signed, mm, from that wall, on a box that begins at ``corner`` of the scan.  seed : a voxel whose
-    grey is the vessel's: of bone and the vessel that it hangs together with, the vessel is not the layer.
+    The grey at its seed is the vessel's: of bone and the vessel that it hangs together with, the vessel is not the
+    layer.
     """
-    values, h = distance.values, float(np.mean(grid.spacing_mm))
+    grid, values, seed = vessel.scan, vessel.distance.values, vessel.levels.seed
+    h = float(np.mean(grid.spacing_mm))
     known_mm = min(REACH[1] * h, float(values.max()) - EVERY * h)
     near = np.flatnonzero((values > -REACH[0] * h) & (values < known_mm))
     near = near[:: max(1, len(near) // LOOKED_AT)]
-    index = unflattened(near, distance.shape) + corner
+    index = unflattened(near, values.shape) + vessel.corner
     layer = layer_in(values.reshape(-1)[near] / h, grid.values[tuple(index.T)])
     if layer is None or layer.inner > -MOVED or seed is None:
         return None
@@ -38,15 +39,12 @@ def layer_around(grid: Grid, distance: Grid, corner: Index, seed: tuple[int, ...
     return layer if abs(layer.vessel - at_seed) < 0.3 * (layer.vessel - layer.grey) else None
 
 
-def with_layer_alone(layer: Layer, grid: Grid, distance: Grid, corner: Index) -> Grid:
-    """The scan with nothing darker than the floor beyond the middle of the layer.
-
-    distance : signed, on a box that begins at ``corner`` of the scan.  Nearer to the wall noise stays as it is.
-    """
+def with_layer_alone(layer: Layer, vessel: Vessel) -> Grid:
+    """The scan with nothing darker than the floor beyond the middle of the layer; nearer, noise stays as it is."""
+    grid, box = vessel.scan, vessel.box
     values = np.maximum(grid.values, np.asarray(np.ceil(layer.floor), grid.values.dtype))
-    box = box_from(corner, distance.shape)
     middle = 0.5 * (layer.inner + layer.outer) * float(np.mean(grid.spacing_mm))
-    values[box] = np.where(distance.values < middle, grid.values[box], values[box])
+    values[box] = np.where(vessel.distance.values < middle, grid.values[box], values[box])
     return grid.with_values(values)
 
 

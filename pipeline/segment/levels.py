@@ -4,6 +4,7 @@ A method is a function like :func:`fuzzy.fuzzy_region`.
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -57,6 +58,10 @@ class GreyLevels:
         """The level of the wall."""
         return 0.5 * (self.inside + self.outside)
 
+    def share(self, grey: NDArray[Any]) -> NDArray[Any]:
+        """Grey as a share of the contrast: 0 outside, 1 inside."""
+        return np.asarray((grey - self.outside) / self.contrast)
+
     def noise_after(self, taps: NDArray[Any]) -> float:
         """Standard deviation of the noise in grey smoothed by binomial taps; from twice on as after twice."""
         return self.noise_left[min(len(taps) // 2, len(self.noise_left) - 1)]
@@ -71,9 +76,9 @@ def box_around(grid: Grid, index: NDArray[Any], half_mm: float, least: int) -> t
     return a, b, c
 
 
-def box_from(corner: Index, shape: tuple[int, ...]) -> tuple[slice, ...]:
+def box_from(corner: Index, shape: tuple[int, ...] | Index) -> tuple[slice, ...]:
     """The voxels of a scan that a box of this shape holds, which begins at a voxel."""
-    return tuple(slice(int(first), int(first) + n) for first, n in zip(corner, shape, strict=True))
+    return tuple(slice(int(first), int(first) + int(n)) for first, n in zip(corner, shape, strict=True))
 
 
 def median(values: NDArray[Any], otherwise: float) -> float:
@@ -88,21 +93,52 @@ def scanner_blur(blur_mm: float, taps: NDArray[Any], voxel: float) -> float:
     return float(np.sqrt(max(blur_mm**2 - smoothing * voxel**2, (0.3 * voxel) ** 2)))
 
 
-def plateau(scan: Grid, distance: Grid, levels: GreyLevels, blur_mm: float) -> GreyLevels:
+@dataclass(frozen=True, eq=False)
+class Vessel:
+    """A vessel in its scan: the signed distance (mm) from its wall, on a box of the scan, and its grey levels.
+
+    taps : the smoothing in which it was found.
+    """
+
+    scan: Grid
+    distance: Grid
+    levels: GreyLevels
+    taps: NDArray[np.float32]
+
+    @cached_property
+    def corner(self) -> Index:
+        """The scan's voxel at which the box begins."""
+        return np.asarray(np.rint(self.scan.to_index(self.distance.origin_mm)), np.int64)
+
+    @property
+    def box(self) -> tuple[slice, ...]:
+        """The scan's voxels in the box."""
+        return box_from(self.corner, self.distance.shape)
+
+    def deep(self, blurs_mm: float, most: int) -> Index:
+        """Indices (n, 3), in the box, of the voxels deeper than that below the wall, or so many of them."""
+        flat = np.flatnonzero(self.distance.values < -blurs_mm)
+        return unflattened(flat[:: max(1, len(flat) // most)], self.distance.shape)
+
+    def grey_around(self, index: Index) -> NDArray[np.float64]:
+        """Mean grey (n,) of the 3^3 voxels around voxels (n, 3) of the box."""
+        return grey_around(self.scan, index + self.corner)
+
+
+def plateau(vessel: Vessel, blur_mm: float) -> GreyLevels:
     """The levels estimated again, from the deepest part of the whole segmented vessel.
 
-    distance : signed, on a box of the scan.  blur_mm : the scanner's.  A tube no thicker than its blur never reaches
-    its plateau: its grey is divided by the profile of a blurred cylinder (non-central chi^2). What is too bright for
-    the vessel does not count.
+    blur_mm : the scanner's.  A tube no thicker than its blur never reaches its plateau: its grey is divided by the
+    profile of a blurred cylinder (non-central chi^2). What is too bright for the vessel does not count.
     """
+    scan, distance, levels = vessel.scan, vessel.distance, vessel.levels
     inside = np.flatnonzero(distance.values < 0)
     if not np.isfinite(blur_mm) or not len(inside):
         return levels
-    corner = np.rint(scan.to_index(distance.origin_mm)).astype(np.int64)
-    there = rebased(inside, distance.shape, corner, scan.shape)
+    there = rebased(inside, distance.shape, vessel.corner, scan.shape)
     off_wall, grey = -distance.values.reshape(-1)[inside], scan.values.reshape(-1)[there]
     depth, core = _deepest(off_wall)
-    limit = _brightest(distance, corner, levels, blur_mm)
+    limit = _brightest(vessel, blur_mm)
     some = core[:: max(1, len(core) // 500)]
     foreign = float(np.mean(grey_around(scan, unflattened(there[some], scan.shape)) > limit))
     if foreign > BRIGHT_SHARE:
@@ -138,11 +174,13 @@ def grey_around(scan: Grid, index: Index) -> NDArray[np.float64]:
     return np.asarray(np.mean(grey, axis=0, dtype=np.float64))
 
 
-def _brightest(distance: Grid, corner: Index, levels: GreyLevels, blur_mm: float) -> float:
+def _brightest(vessel: Vessel, blur_mm: float) -> float:
     """The grey above which a voxel is no vessel: BRIGHTER times the contrast at the seed, corrected for its blur."""
+    distance, levels = vessel.distance, vessel.levels
     if levels.seed is None:
         return float("inf")
-    depth = -float(distance.values[box_around(distance, np.array(levels.seed) - corner, 0.0, 1)].min(initial=0.0))
+    seed = box_around(distance, np.array(levels.seed) - vessel.corner, 0.0, 1)
+    depth = -float(distance.values[seed].min(initial=0.0))
     # grey at the seed was smoothed by 1-2-1, of variance 1/2
     share = 1.0 - np.exp(-0.5 * depth**2 / (blur_mm**2 + 0.5 * float(np.mean(distance.spacing_mm)) ** 2))
     return levels.outside + BRIGHTER * (levels.at_seed - levels.outside) / max(float(share), 0.4)

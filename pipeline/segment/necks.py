@@ -23,7 +23,7 @@ from pipeline.segment._kernels.voxels import components, gaps, shell
 from pipeline.segment.config import SegmentConfig
 from pipeline.segment.connect import connect, neighbours
 from pipeline.segment.contact import inside_of
-from pipeline.segment.levels import BRIGHTER, GreyLevels, Index, Region
+from pipeline.segment.levels import BRIGHTER, GreyLevels, Index, Region, Vessel
 from pipeline.segment.surface import boxed
 from pipeline.segment.thin import CREST_VOXELS, FULL, LEAST_RADIUS, Beyond, beyond_vessel
 from solver.grid import Array, Grid
@@ -151,20 +151,20 @@ def through_necks(
     return region, None
 
 
-def closed_necks(distance: NDArray[np.float32], corner: Index, grid: Grid, least: int) -> list[Array]:
+def closed_necks(vessel: Vessel, least: int) -> list[Array]:
     """The axes of necks that are open to connectedness, but closed in the signed distance.
 
     The wall is looked for in smoothed grey: a neck of 1.0 to 1.4 voxels radius reaches half the contrast before the
-    smoothing, and not after. distance : on the box that begins at ``corner``; least : voxels that a part must have.
+    smoothing, and not after. least : voxels that a part must have.
     """
-    flat, inner = inside_of(distance)
+    flat, inner = inside_of(vessel.distance.values)
     number = components(inner)
     large = np.flatnonzero(np.bincount(number) >= least)
     if len(large) < 2:
         return []
-    voxels = unflattened(flat, distance.shape)
+    voxels = unflattened(flat, vessel.distance.shape) + vessel.corner
     necks: list[Array] = []
-    pieces = sorted((voxels[number == n] + corner for n in large), key=len, reverse=True)
+    pieces = sorted((voxels[number == n] for n in large), key=len, reverse=True)
     whole, left = pieces[0].astype(float), [p.astype(float) for p in pieces[1:]]
     while left:
         tree = cKDTree(whole)
@@ -175,7 +175,7 @@ def closed_necks(distance: NDArray[np.float32], corner: Index, grid: Grid, least
         if not np.isfinite(gap[first]):
             break
         piece = left.pop(n)
-        axis = _ahead(grid, (whole, whole[at[first]]), (piece, piece[first]))
+        axis = _ahead(vessel.scan, (whole, whole[at[first]]), (piece, piece[first]))
         if axis is not None:
             necks.append(axis)
             whole = np.concatenate([whole, piece])
@@ -190,21 +190,19 @@ def _ahead(grid: Grid, here: tuple[Array, Array], there: tuple[Array, Array]) ->
     return _axis(grid, start, stop) if on else None
 
 
-def add_necks(
-    necks: Sequence[Array], box: tuple[NDArray[np.float32], Index], grid: Grid, levels: GreyLevels, blur_mm: float
-) -> tuple[str, ...]:
-    """Lower the signed distance to that of the union with the necks; returns a sentence for each.
+def add_necks(necks: Sequence[Array], vessel: Vessel, distance: NDArray[np.float32], blur_mm: float) -> tuple[str, ...]:
+    """Lower the vessel's signed ``distance`` to that of the union with the necks; returns a sentence for each.
 
-    box : signed distance, and the voxel of the grid at which it begins.  blur_mm : the scanner's.
+    blur_mm : the scanner's.
     """
-    (distance, corner), spacing = box, np.asarray(grid.spacing_mm)
-    sigma, said = CREST_VOXELS * float(spacing.min()), []
+    grid, spacing = vessel.scan, vessel.scan.spacing_mm
+    sigma, said = CREST_VOXELS * grid.voxel_mm, []
     whole = float(np.hypot(blur_mm, sigma))
     for neck in necks:
         peak = values_at(Blurred(grid.values, spacing, sigma), neck * spacing)
-        share = np.clip((peak - levels.outside) / levels.contrast, 0.0, 0.75)
-        radius = np.maximum(whole * np.sqrt(-2.0 * np.log1p(-share)), LEAST_RADIUS * float(spacing.min()))
-        at = (neck - corner) * spacing
+        share = np.clip(vessel.levels.share(peak), 0.0, 0.75)
+        radius = np.maximum(whole * np.sqrt(-2.0 * np.log1p(-share)), LEAST_RADIUS * grid.voxel_mm)
+        at = (neck - vessel.corner) * spacing
         cones(at[:-1], at[1:], radius[:-1], radius[1:], spacing, float(distance.max()), distance)
         n = int(np.argmin(radius))
         said.append(_said(grid.to_mm(neck[n]), float(radius[n])))

@@ -32,7 +32,7 @@ def beside(scan: Grid, distance: Grid, seeds_mm: Array, wire_radius_mm: float, b
 
     distance : signed, of the region, on a box of the scan.  blur_mm : the scanner's.
     """
-    h = float(np.min(scan.spacing_mm))
+    h = scan.voxel_mm
     inside = distance.values[_inside(distance)]
     if not inside.size or -float(np.percentile(inside, 1)) > AS_THIN * wire_radius_mm + AS_THIN_VOXELS * h:
         return None

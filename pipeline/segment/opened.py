@@ -41,8 +41,8 @@ def opened(
     stiffness_N_mm2 : of the wall.     given : whether it was given as a file instead of segmented.
     """
     grid, axes = in_memory_order(lumen.distance)
-    spacing = np.asarray(grid.spacing_mm)
-    voxel, most = float(spacing.min()), float(np.max(grid.values))
+    spacing = grid.spacing_mm
+    voxel, most = grid.voxel_mm, float(np.max(grid.values))
     limit, allowed = OUTSIDE_VOXELS * voxel, may_lie_outside_mm(voxel, stiffness_N_mm2)
     _, pressed = _outside(grid, curves, limit)
     gaps = between_pieces(grid, curves) if given else []

@@ -15,6 +15,7 @@ from scipy.spatial import cKDTree
 
 from pipeline.arrays.grids import indices_of, spelt
 from pipeline.model import Array, Curve
+from pipeline.segment.levels import box_around
 from solver.grid import Grid
 
 NEAR_MM = 3.0
@@ -83,12 +84,10 @@ def between_pieces(distance: Grid, curves: Sequence[Curve]) -> list[Gap]:
 
 def _middle(distance: Grid, pieces: NDArray[np.int32], number: int, near: Array) -> tuple[Array, float]:
     """Index (3,) of a numbered piece's place farthest from its wall, close to an index, and how far that is, mm."""
-    reach = np.ceil(AROUND_MM / distance.spacing_mm)
-    low = np.maximum(np.rint(near - reach).astype(int), 0)
-    box = tuple(slice(a, b) for a, b in zip(low, np.rint(near + reach).astype(int) + 1, strict=True))
+    box = box_around(distance, np.clip(np.rint(near), 0, np.array(distance.shape) - 1), AROUND_MM, 0)
     depth = np.where(pieces[box] == number, -distance.values[box], 0.0)
     place = np.array(np.unravel_index(np.argmax(depth), depth.shape))
-    return (low + place).astype(float), float(depth.max())
+    return place + [float(side.start) for side in box], float(depth.max())
 
 
 def crossed(gaps: Sequence[Gap]) -> str:

@@ -17,7 +17,7 @@ from pipeline.arrays.jets import smooth_voxels
 from pipeline.arrays.lattice import sparse_zeros
 from pipeline.segment._kernels.voxels import rebased
 from pipeline.segment.contact import Contact, contacts, parts
-from pipeline.segment.levels import GreyLevels, Index
+from pipeline.segment.levels import Index, Vessel
 from solver.grid import Grid, read_only
 
 STEP = 2.5
@@ -44,20 +44,16 @@ NEXT_TO = 0.1
 """Depth in voxels that is left within a sheet, so that what lies on its two sides still meets there."""
 
 
-def open_ones(
-    scan: Grid, distance: Grid, corner: Index, levels: GreyLevels, taps: NDArray[np.float32], even: bool
-) -> tuple[Contact, ...]:
+def open_ones(vessel: Vessel, even: bool) -> tuple[Contact, ...]:
     """Places where vessels that do not branch from each other are open to each other, by their shape or by a sheet.
 
-    distance : signed distance on the vessel's box, which begins at ``corner`` of the scan.  taps : the smoothing in
-    which the vessel was found.  even : whether it is filled alike across; a wire in a fainter layer leaves a sheet
-    between it and the brighter one.
+    even : whether it is filled alike across; a wire in a fainter layer leaves a sheet between it and the brighter one.
     """
-    seen = contacts(distance)
-    sheet = sheets(scan, distance, corner, levels, taps) if even else None
+    seen = contacts(vessel.distance)
+    sheet = sheets(vessel) if even else None
     if sheet is None or not len(sheet):
         return seen
-    parted = contacts(_parted(distance, sheet), LEAST_AREA)
+    parted = contacts(_parted(vessel.distance, sheet), LEAST_AREA)
     # an opening that both find is larger by the one or by the other
     alone = [c for c in seen if all(np.linalg.norm(c.place_mm - o.place_mm) > _across(o) for o in parted)]
     return (*parted, *alone) if parted else seen
@@ -68,22 +64,23 @@ def _across(opening: Contact) -> float:
     return 2.0 * float(np.sqrt(opening.area_mm2 / np.pi))
 
 
-def sheets(scan: Grid, distance: Grid, corner: Index, levels: GreyLevels, taps: NDArray[np.float32]) -> Index:
-    """The voxels (flat, of the vessel's box) of sheets that may part the vessel; arguments of ``open_ones``."""
+def sheets(vessel: Vessel) -> Index:
+    """The voxels (flat, of the vessel's box) of sheets that may part the vessel."""
+    scan, distance = vessel.scan, vessel.distance
     shape, depth = distance.shape, -distance.values.reshape(-1)
-    spacing, inner = np.asarray(distance.spacing_mm), np.flatnonzero(depth > 0)
+    spacing, inner = distance.spacing_mm, np.flatnonzero(depth > 0)
     if not len(inner):
         return inner
-    voxel = float(spacing.min())
-    there = rebased(inner, shape, np.asarray(corner, np.int64), scan.shape)
-    share = (smooth_voxels(scan.values, taps, there) - levels.outside) / levels.contrast
+    voxel = distance.voxel_mm
+    there = rebased(inner, shape, vessel.corner, scan.shape)
+    share = vessel.levels.share(smooth_voxels(scan.values, vessel.taps, there))
     # no brighter than the plateau: beside a wire everything is dark. The level's own may be a membrane's
     deep = share[depth[inner] > DEEP * voxel]
     grey = sparse_zeros(shape, np.float32)
     share = np.minimum(share, max(1.0, float(np.median(deep))) if len(deep) else 1.0)
     grey.reshape(-1)[inner] = share
     ways = [way for way in WAYS if np.linalg.norm(way * spacing) <= LONGEST * STEP * voxel]
-    least = max(DARKER, SIGMAS * levels.noise_after(taps) / levels.contrast)
+    least = max(DARKER, SIGMAS * vessel.levels.noise_after(vessel.taps) / vessel.levels.contrast)
     inner = np.asarray(inner[share.max() - share > least])  # nothing beside the others is so much brighter
     dark = inner[np.concatenate(in_parts(partial(_darker, grey, ways), inner)) > least]
     if not len(dark):
@@ -106,10 +103,10 @@ def _darker(grey: NDArray[np.float32], ways: list[Index], voxels: Index) -> NDAr
 
 def _parted(distance: Grid, sheet: Index) -> Grid:
     """The signed distance with sheets (flat voxels) for walls."""
-    spacing, values = np.asarray(distance.spacing_mm), distance.values.copy()
+    spacing, values = distance.spacing_mm, distance.values.copy()
     inner = np.flatnonzero(values < 0)
     tree = cKDTree(unflattened(sheet, distance.shape) * spacing)
     away = tree.query(unflattened(inner, distance.shape) * spacing, distance_upper_bound=-float(values.min()))[0]
-    depth = np.maximum(away, NEXT_TO * float(spacing.min()))
+    depth = np.maximum(away, NEXT_TO * distance.voxel_mm)
     values.reshape(-1)[inner] = np.maximum(values.reshape(-1)[inner], -depth)
     return distance.with_values(read_only(values))

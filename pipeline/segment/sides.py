@@ -12,9 +12,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.special import ndtri
 
-from pipeline.segment.levels import BRIGHTER, GreyLevels, Index, grey_around
+from pipeline.segment.levels import BRIGHTER, GreyLevels, Vessel
 from pipeline.segment.uneven import EVEN, HIGHEST, LOWEST
-from solver.grid import Array, Grid
+from solver.grid import Array
 
 BESIDE = 2.5
 """How far inside and outside the wall, in voxels, the grey has reached its plateau."""
@@ -86,16 +86,12 @@ class Sides:
 
 @dataclass(frozen=True, eq=False)
 class _Wall:
-    """A wall, and the scan whose grey is read beside it.
+    """The wall of a vessel, beside which the scan's grey is read.
 
-    distance : signed, mm, on the vessel's box, which begins at ``corner`` of the scan.  feet : places (n, 3), mm from
-    the scan's first voxel.  normals : (n, 3), outward.
+    feet : places (n, 3) on it, mm from the scan's first voxel.  normals : (n, 3), outward.
     """
 
-    scan: Grid
-    distance: Grid
-    corner: Index
-    levels: GreyLevels
+    vessel: Vessel
     feet: Array
     normals: Array
 
@@ -111,26 +107,23 @@ class _Wall:
 
     def beside(self, way: float) -> tuple[Array, Array]:
         """Places (m, 3) with room beside them, ``way`` -1 inside, 1 outside, and the share (m,) of contrast there."""
-        h = float(np.max(self.scan.spacing_mm))
-        index = np.rint((self.feet + way * BESIDE * h * self.normals) / self.scan.spacing_mm).astype(np.int64)
-        index -= self.corner
-        kept = np.all((index >= 0) & (index < self.distance.shape), axis=1)
-        kept[kept] = way * self.distance.values[tuple(index[kept].T)] > ROOM * h
-        grey = grey_around(self.scan, index[kept] + self.corner)
-        return self.feet[kept], (grey - self.levels.outside) / self.levels.contrast
+        vessel, spacing = self.vessel, self.vessel.scan.spacing_mm
+        h = float(np.max(spacing))
+        index = np.rint((self.feet + way * BESIDE * h * self.normals) / spacing).astype(np.int64) - vessel.corner
+        kept = np.all((index >= 0) & (index < vessel.distance.shape), axis=1)
+        kept[kept] = way * vessel.distance.values[tuple(index[kept].T)] > ROOM * h
+        return self.feet[kept], vessel.levels.share(vessel.grey_around(index[kept]))
 
 
-def sides_of(
-    scan: Grid, distance: Grid, corner: Index, levels: GreyLevels, wall: tuple[Array, Array], wire: bool
-) -> Sides | None:
+def sides_of(vessel: Vessel, wall: tuple[Array, Array], wire: bool) -> Sides | None:
     """What lies along the wall on both of its sides; None where it is the same all along, or the vessel is thin.
 
-    distance : signed distance on the vessel's box, which begins at ``corner`` of the scan.  wall : places (n, 3) on it,
-    mm from the scan's first voxel, and outward normals (n, 3).  wire : whether the scan shows one.
+    wall : places (n, 3) on it, mm from the scan's first voxel, and outward normals (n, 3).  wire : whether the scan
+    shows one.
     """
-    if levels.foreign:  # with bone or metal in it, nobody can tell; that is said by itself
+    if vessel.levels.foreign:  # with bone or metal in it, nobody can tell; that is said by itself
         return None
-    along = _Wall(scan, distance, corner, levels, *wall)
+    along = _Wall(vessel, *wall)
     # a fainter layer of medium looks like tissue from inside the other: where there is one, nothing is asked of outside
     return _filled(along, wire) or _around_it(along)
 

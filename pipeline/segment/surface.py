@@ -19,7 +19,7 @@ from pipeline.segment._kernels.wall import PAD, Wall, dilate, feet, mean_around,
 from pipeline.segment.blurred import blur_of_wall, half_level_offset
 from pipeline.segment.closest import find_closest
 from pipeline.segment.contact import numbered
-from pipeline.segment.levels import GreyLevels, Index, failed, grey_around, plateau, scanner_blur
+from pipeline.segment.levels import GreyLevels, Index, Vessel, failed, grey_around, plateau, scanner_blur
 from pipeline.segment.sides import BESIDE, Sides, sides_of
 from solver.grid import Array, Grid, read_only
 
@@ -68,6 +68,10 @@ class Site:
         empty = np.broadcast_to(np.float32(0), [n - 2 * PAD for n in self.state.shape])
         return Grid(empty, self.volume.spacing_mm, self.volume.to_mm(self.corner), self.volume.direction)
 
+    def vessel(self, found: "SignedDistance") -> Vessel:
+        """The vessel whose wall was found here."""
+        return Vessel(self.volume, self.grid.with_values(read_only(found.values)), found.levels, self.taps)
+
 
 def padded_box(voxels: Index, grid: Grid, margin_mm: float, more: Index = NONE) -> tuple[Index, Shape]:
     """The box of the voxels (flat) with ``margin_mm`` around them: its first voxel, and its shape once padded.
@@ -99,7 +103,7 @@ def prepare(volume: Grid, order: Index, taps: NDArray[np.float32], margin_mm: fl
     state = sparse_zeros(shape, np.uint8)
     flat = into_box(order, volume, corner, shape)
     state.reshape(-1)[flat] = 1
-    dilate(state, flat, LAYERS, 2)
+    dilate(state, flat, LAYERS)
     return Site(volume, taps, corner, state, np.flatnonzero(state))
 
 
@@ -108,7 +112,7 @@ def _half_level_wall(site: Site, level: float, inside: NDArray[np.uint8]) -> tup
     lattice = sparse_zeros(site.state.shape, np.float32)
     smooth_lattice(site.volume.values, site.corner, site.taps, site.state, site.near, lattice)
     voxels = surface_voxels(site.state, lattice, level, DEEP, site.near, inside)
-    spacing = np.asarray(site.volume.spacing_mm)
+    spacing = site.volume.spacing_mm
     parts = in_parts(lambda part: feet(lattice, level, spacing, part, inside), voxels)
     return voxels, Wall(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
 
@@ -178,7 +182,7 @@ def signed_distance(site: Site, levels: GreyLevels, outer_mm: float, sides: Side
 
     sides : what lies along the wall, where that is known to differ.
     """
-    spacing: Array = np.asarray(site.volume.spacing_mm)
+    spacing = site.volume.spacing_mm
     inside = sparse_zeros(site.state.shape, np.uint8)
     owner = np.full(site.state.shape, 0, np.int32)  # written to all over: in large pages, which zeros are not given
     box = Owned(owner, inside, spacing)
@@ -196,7 +200,7 @@ def signed_distance(site: Site, levels: GreyLevels, outer_mm: float, sides: Side
     own = own if own.any() else good
     blurs, whole = (0.0, np.ones(len(voxels))) if sides is None else sides.at(site.from_first(wall.foot))
     blur = blur_of_wall((wall.steepness / whole)[own], wall.curvature[own], levels.contrast)
-    wall = _corrected(wall, voxels, owner, blur, float(spacing.min()), blurs)
+    wall = _corrected(wall, voxels, owner, blur, site.volume.voxel_mm, blurs)
     inside.reshape(-1)[seen] = wall.distance[good] < 0
     visits = find_closest(box, seen, wall.foot, outer_mm)
     stray = lost_feet(box, voxels, wall.foot, good, blur * float(np.max(np.abs(blurs))))
@@ -214,11 +218,11 @@ def wall_of(site: Site, levels: GreyLevels, outer_mm: float, wire: bool = False)
 
     wire : whether the scan shows one, which is brighter than the vessel.
     """
-    voxel = float(np.min(site.volume.spacing_mm))
+    voxel = site.volume.voxel_mm
     found = signed_distance(site, levels, outer_mm)
     for _ in range(SURFACE_ROUNDS):
         own = scanner_blur(found.blur_mm, site.taps, voxel)
-        again = plateau(site.volume, site.grid.with_values(read_only(found.values)), levels, own)
+        again = plateau(site.vessel(found), own)
         thin = -float(found.values.min()) < 4 * found.blur_mm
         near = abs(again.half - levels.half) < (THIN_TOLERANCE if thin else LEVEL_TOLERANCE) * levels.contrast
         # a surface made before bone was noticed has the bone in its blur: one more round
@@ -227,8 +231,7 @@ def wall_of(site: Site, levels: GreyLevels, outer_mm: float, wire: bool = False)
         levels = again
         del found  # before the next takes its place in memory
         found = signed_distance(site, levels, outer_mm)
-    distance = site.grid.with_values(read_only(found.values))
-    sides = sides_of(site.volume, distance, site.corner, again, found.wall, wire)
+    sides = sides_of(replace(site.vessel(found), levels=again), found.wall, wire)
     if sides is not None:
         levels = again
         found = signed_distance(site, levels, outer_mm, sides)

@@ -25,7 +25,7 @@ from pipeline.segment._kernels.voxels import largest, rebased
 from pipeline.segment._kernels.wall import PAD, dilate
 from pipeline.segment.connect import connect, neighbours
 from pipeline.segment.contact import numbered, parts
-from pipeline.segment.levels import GreyLevels, Index
+from pipeline.segment.levels import GreyLevels, Index, Vessel
 from pipeline.segment.surface import into_box, padded_box
 from solver.grid import Array, Grid
 
@@ -99,7 +99,7 @@ def _layers(around: Index, of: Index, shape: tuple[int, int, int], count: int) -
     """For voxels ``of`` a padded box (flat): 1 for those ``around``, 2, 3, ... in layers around them, 0 beyond."""
     state = sparse_zeros(shape, np.uint8)
     state.reshape(-1)[around] = 1
-    dilate(state, around, count, 2)
+    dilate(state, around, count)
     return np.asarray(state.reshape(-1)[of])
 
 
@@ -122,7 +122,7 @@ def beyond_skirt(
 def beyond_vessel(volume: Grid, low: Index, order: Index, levels: GreyLevels, affinity: Affinity) -> Beyond:
     """What lies beyond the vessel ``order``, among the voxels of ``low_region``."""
     found, inner, thick = beyond_skirt(volume, order, low, levels.outside + FULL * levels.contrast, affinity.taps)
-    share = (smooth_voxels(volume.values, affinity.taps, found) - levels.outside) / levels.contrast
+    share = levels.share(smooth_voxels(volume.values, affinity.taps, found))
     return Beyond(found, inner, share, thick)
 
 
@@ -170,20 +170,20 @@ def _highest(points: Array, share: Array) -> NDArray[np.bool_]:
     return np.array([s >= HIGHEST * share[n].max() for s, n in zip(share, near, strict=True)], bool)
 
 
-def balls(volume: Grid, thin: Index, corner: Index, levels: GreyLevels, blur_mm: float) -> Balls:
+def balls(vessel: Vessel, thin: Index, blur_mm: float) -> Balls:
     """Crest points of thin branches and the radii that their peaks tell. blur_mm : the scanner's."""
-    spacing = np.asarray(volume.spacing_mm)
-    sigma = CREST_VOXELS * float(spacing.min())
+    volume, spacing = vessel.scan, vessel.scan.spacing_mm
+    sigma = CREST_VOXELS * volume.voxel_mm
     whole = float(np.hypot(blur_mm, sigma))
-    at, peak = crests(Blurred(volume.values, spacing, sigma), thin, levels.outside, SHARP / whole**2)
-    share = np.clip((peak - levels.outside) / levels.contrast, 0.0, 0.95)
+    at, peak = crests(Blurred(volume.values, spacing, sigma), thin, vessel.levels.outside, SHARP / whole**2)
+    share = np.clip(vessel.levels.share(peak), 0.0, 0.95)
     radius = whole * np.sqrt(-2.0 * np.log1p(-share))
     good = np.flatnonzero(share > 0)
-    good = good[_highest(at[good] / float(spacing.min()), share[good])]
+    good = good[_highest(at[good] / volume.voxel_mm, share[good])]
     # several voxels lead to one point of the crest: one ball per third of a voxel
     _, first = np.unique(np.rint(3.0 * at[good] / spacing), axis=0, return_index=True)
-    thickest = np.maximum(radius[good][first], LEAST_RADIUS * float(spacing.min()))
-    return at[good][first] - corner * spacing, thickest
+    thickest = np.maximum(radius[good][first], LEAST_RADIUS * volume.voxel_mm)
+    return at[good][first] - vessel.corner * spacing, thickest
 
 
 def _nearest(places: Array, points: Array) -> tuple[Array, NDArray[np.int64]]:

@@ -13,7 +13,7 @@ from scipy import ndimage
 from pipeline.arrays.grids import spread, unflattened
 from pipeline.segment._kernels.voxels import eroded, extent, rebased
 from pipeline.segment.contact import numbered
-from pipeline.segment.levels import GreyLevels, Index, Region
+from pipeline.segment.levels import GreyLevels, Index, Region, box_from
 from solver.grid import Array, Grid, read_only
 
 BLOCK = 5
@@ -67,7 +67,7 @@ def filling(grid: Grid, region: Region) -> Filling:
     shape = tuple(int(-(-n // BLOCK)) for n in high - low)
     if len(core) == 0:
         return Filling(np.ones(shape), low, 1.0)
-    grey = (grid.values[tuple((core + low).T)].astype(float) - region.levels.outside) / region.levels.contrast
+    grey = region.levels.share(grid.values[tuple((core + low).T)].astype(float))
     block: Index = np.asarray(np.ravel_multi_index(tuple((core // BLOCK).T), shape), np.int64)
     order = np.lexsort((grey, block))
     block, grey = block[order], grey[order]
@@ -95,7 +95,7 @@ def filled(grid: Grid, levels: GreyLevels, found: Filling) -> Grid:
     step, first = np.full(3, 1.0 / BLOCK), 0.5 / BLOCK - 0.5
     share = ndimage.affine_transform(found.share, step, first, tuple(shape), order=1, mode="nearest")
     values = np.array(grid.values, np.float32)
-    box = tuple(slice(int(c), int(c) + int(n)) for c, n in zip(found.corner, shape, strict=True))
+    box = box_from(found.corner, shape)
     out = np.float32(levels.outside)
     values[box] = out + (values[box] - out) / np.minimum(share, 1.0).astype(np.float32)
     return grid.with_values(read_only(values))

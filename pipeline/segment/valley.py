@@ -107,10 +107,9 @@ def _passes_by(low: _Low, branch: Index, place: Index) -> bool:
     slab = slice(*np.searchsorted(low.flat, np.array([first[0], last[0]]) * int(np.prod(low.grid.shape[1:]))))
     near = _within(low.places[slab], first, last)
     flat, places, of_vessel = (of[slab][near] for of in (low.flat, low.places, low.of_vessel))
-    levels = low.region.levels
-    seen = smooth_voxels(low.grid.values, low.region.taps, flat)
     share = np.zeros(last - first, np.float32)
-    share[tuple((places - first).T)] = (seen - levels.outside) / levels.contrast
+    seen = smooth_voxels(low.grid.values, low.region.taps, flat)
+    share[tuple((places - first).T)] = low.region.levels.share(seen)
     own = share[tuple((here - first).T)]
     least = HELD * np.quantile(own, BRIGHT)
     number = np.asarray(label(share >= least, connectivity=3))

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pipeline.arrays.grids import corners_mm
+from pipeline.arrays.grids import around, corners_mm
 from pipeline.load import Header, LoadError, Source, parts_of
 from pipeline.load.lumens import LOOK_AT, meant_within_mm, read_lumen
 from pipeline.load.masks import mask_header
@@ -93,12 +93,10 @@ def _ends_mm(found: Branches | Shapes | Volume | Header) -> Array:
 
 def _any_near(lumen: Volume, point_mm: Array, within_mm: float) -> bool:
     """Whether a voxel of the lumen, to its corners, lies within a distance of a point; those around it are asked."""
-    half = float(np.linalg.norm(lumen.spacing_mm)) / 2.0
-    index, reach = lumen.to_index(point_mm[None])[0], (within_mm + half) / lumen.spacing_mm
-    low = np.clip(np.floor(index - reach).astype(int), 0, lumen.shape)
-    high = np.clip(np.ceil(index + reach).astype(int) + 1, 0, lumen.shape)
-    near = np.argwhere(lumen.values[tuple(map(slice, low, high))] >= 0.5) + low
-    return bool(np.any(np.linalg.norm(lumen.to_mm(near) - point_mm, axis=1) <= within_mm + half))
+    reach_mm = within_mm + 0.5 * float(np.linalg.norm(lumen.spacing_mm))
+    box = around(lumen, point_mm[None], reach_mm)
+    near = box.to_mm(np.argwhere(box.values >= 0.5))
+    return bool(np.any(np.linalg.norm(near - point_mm, axis=1) <= reach_mm))
 
 
 def _entry(case: _At) -> str:

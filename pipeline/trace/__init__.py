@@ -77,7 +77,7 @@ def trace(
     heading = np.asarray(entry_direction, float) / np.linalg.norm(np.asarray(entry_direction, float))
     stated = EntryPose(np.asarray(entry_mm, float), heading, expected_mm, Opacity.of(opacity))
     curve = _seen((frame, reference, lumen), stated, previous, config)
-    voxel = float(np.min(frame.spacing_mm))
+    voxel = frame.voxel_mm
     larger, ok = times(frame), curve.status is FrameStatus.OK
     if larger > 1 and (not ok or curve.levels.get("blur_mm", 0.0) > THICK_VOXELS * voxel):
         seen, empty = coarse_scan(frame, larger), reference and coarse_scan(reference, larger)

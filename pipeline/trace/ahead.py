@@ -10,7 +10,7 @@ from pipeline.arrays.jets import Blurred, values_at
 from pipeline.arrays.polyline import tip_tangent
 from pipeline.model import Array
 from pipeline.trace.subtraction import CREST_VOXELS, Subtraction
-from pipeline.trace.ways import cone, goes_on_unseen
+from pipeline.trace.ways import KEPT, MAYBE, QUICK, Grey, cone, highest, ways_on
 
 FIRST_VOXELS, VOXELS = 2.0, 4
 """Where, and over what length, the grey ahead is averaged: beyond the wire's own blur."""
@@ -60,10 +60,14 @@ def dark_ahead(image: Subtraction, points: Array) -> bool:
         inside = (image.from_side(at) > EDGE_VOXELS) & (image.depth_at(at) < -DEEP_VOXELS * image.voxel)
         return np.where(inside, -image.along(at), -np.inf)
 
-    if not goes_on_unseen(image, tip, last, 0.0, DARK, dark):
+    def stands_out(along: Grey) -> bool:
+        tries = (QUICK, MAYBE), (KEPT, DARK)
+        return all(highest(ways_on(image, tip, last, kept, along), 0.0) > least for kept, least in tries)
+
+    if not stands_out(dark):
         return False
     usual = _usual_ahead(image, tip, last)
-    return goes_on_unseen(image, tip, last, 0.0, DARK, lambda at: dark(at) + usual[_voxels_from(image, tip, at)])
+    return stands_out(lambda at: dark(at) + usual[_voxels_from(image, tip, at)])
 
 
 def washed_out(image: Subtraction, points: Array, sigma: float) -> float:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from pipeline.arrays.grids import sampled, spelt, spread
+from pipeline.arrays.grids import around, sampled, spelt, spread
 from pipeline.model import Array, Volume
 from solver.grid import Grid
 
@@ -69,10 +69,7 @@ def passed_by_dark(frame: Volume, reference: Volume | None, entry_mm: Array) -> 
 
 def _around(frame: Volume, reference: Volume | None, entry_mm: Array) -> tuple[NDArray[np.float32], Grid]:
     """The frame's grey around the entry less the reference's, where that is seen; and the frame's part."""
-    at, spacing = frame.to_index(entry_mm[None])[0], np.asarray(frame.spacing_mm, float)
-    first = np.clip(np.floor(at - REACH_MM / spacing), 0, np.array(frame.shape) - 1).astype(int)
-    stop = np.clip(np.ceil(at + REACH_MM / spacing) + 1, first + 1, frame.shape).astype(int)
-    box = frame.crop(first, stop)
+    box = around(frame, entry_mm[None], REACH_MM)
     grey = box.values.astype(np.float32)
     if reference is not None:
         grey = np.nan_to_num(grey - sampled(reference, box, np.nan).values)
@@ -81,11 +78,10 @@ def _around(frame: Volume, reference: Volume | None, entry_mm: Array) -> tuple[N
 
 def _nearest(grey: NDArray[np.float32], box: Grid, entry_mm: Array) -> Line | None:
     """The point of the brightest line that is nearest to the entry; None without one."""
-    spacing = np.asarray(box.spacing_mm, float)
     if min(grey.shape) < 3:
         return None
-    strength = _of_lines(grey, spacing)
-    if not len(line := _strongest(strength, spacing)):
+    strength = _of_lines(grey, box.spacing_mm)
+    if not len(line := _strongest(strength, box.spacing_mm)):
         return None
     points = box.to_mm(line)
     away = np.linalg.norm(points - entry_mm, axis=1)

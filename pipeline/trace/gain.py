@@ -88,7 +88,7 @@ def matched(
 
     seen, still : the frame's and the reference's own grey at ``region.sample``.
     """
-    at, distance, voxel = region.sample_flat, region.sample_depth, float(np.min(region.box.spacing_mm))
+    at, distance, voxel = region.sample_flat, region.sample_depth, region.box.voxel_mm
     deep, out = distance < -voxel, distance > 2 * voxel
     if min(np.count_nonzero(deep), np.count_nonzero(out)) < LEAST_LEVEL:
         return 1.0

@@ -39,7 +39,7 @@ ALONE_BLURS, ALONE_ROUND = 3.5, 0.75
 
 def _scanned(image: Subtraction, points: Array) -> Array:
     """Blurred grey (n,) of the scan at points (n, 3)."""
-    size = np.asarray(image.scan.spacing_mm)
+    size = image.scan.spacing_mm
     field = Blurred(image.scan.values, size, CREST_VOXELS * float(size.min()))
     return np.asarray(values_at(field, image.in_scan(points) * size))
 

@@ -3,7 +3,6 @@
 The grey is a reference scan's, or a model of the lumen's wall.
 """
 
-import weakref
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -16,7 +15,7 @@ from scipy.special import ndtr
 from pipeline.arrays.edges import layer_in
 from pipeline.arrays.grids import contiguous, corners_mm, in_memory_order, integer_offset, reorder, sampled, spread
 from pipeline.arrays.lattice import sparse_zeros
-from pipeline.arrays.spare import Spare
+from pipeline.arrays.spare import Last, Spare
 from pipeline.model import Lumen, Volume
 from pipeline.trace._kernels.runs import WallModel, denoised, modelled, runs_below, subtract
 from solver.grid import Grid
@@ -98,7 +97,7 @@ class SearchRegion:
     @cached_property
     def inner(self) -> NDArray[np.int64]:
         """Flat indices of all voxels that are more than a voxel inside the wall."""
-        return np.flatnonzero(self.box.values < -float(np.min(self.box.spacing_mm)))
+        return np.flatnonzero(self.box.values < -self.box.voxel_mm)
 
     @cached_property
     def greys(self) -> Spare:
@@ -141,26 +140,22 @@ def _region(frame: Grid, distance: Grid) -> SearchRegion:
     box, corner = _onto(frame, distance)
     box = contiguous(box)
     # in float64: a limit rounded up to float32 may include the distances that were cut off at it
-    runs = runs_below(box.values, HALO_VOXELS * float(box.spacing_mm.min()))
+    runs = runs_below(box.values, HALO_VOXELS * box.voxel_mm)
     allowed = box.values < INSIDE_MM
     axis = np.flatnonzero(allowed)
     within = axis[:: max(1, len(axis) // SAMPLE)]
     return SearchRegion(box, corner, runs, axis, within, allowed.view(np.uint8), frame.shape)
 
 
-_regions: weakref.WeakKeyDictionary[Lumen, tuple[bytes, SearchRegion]] = weakref.WeakKeyDictionary()
-"""The last region of each lumen: frames share it, as it depends on the lumen and the frames' lattice alone."""
+_regions = Last[SearchRegion]()
+"""By the frames' lattice, on which they depend beside the lumen alone: frames share them."""
 
 
 def region_of(frame: Grid, lumen: Lumen, axes: tuple[int, int, int]) -> SearchRegion:
     """The region for frames of this lattice (their axes reordered by ``axes``)."""
     lattice = (frame.shape, axes, frame.spacing_mm, frame.origin_mm, frame.direction)
     key = np.concatenate([np.ravel(part) for part in lattice]).tobytes()
-    known = _regions.get(lumen)
-    if known is None or known[0] != key:
-        known = key, _region(frame, reorder(lumen.distance, axes))
-        _regions[lumen] = known
-    return known[1]
+    return _regions.of(lumen, key, lambda: _region(frame, reorder(lumen.distance, axes)))
 
 
 def shows_lumen(frame: Volume, lumen: Lumen) -> bool:
@@ -183,7 +178,7 @@ def _wall_model(
     In a wall of silicone it is two steps: with one, its outer edge counted as noise, 100 grey where it was 25. empty :
     whether the scan shows no wire.
     """
-    voxel = float(np.min(scan.spacing_mm))
+    voxel = scan.voxel_mm
     at = region.sample
     grey, distance = scan.values[tuple((at + corner).T)], region.box.values[tuple(at.T)]
     deep, out = distance < -voxel, (distance > 2 * voxel) & (distance < HALO_VOXELS * voxel)
@@ -237,12 +232,12 @@ def _smoothed(reference: Volume, region: SearchRegion, lumen: Lumen, axes: tuple
     subtract(scan.values, model, corner, region.runs, rough)
     variance = spread(rough.reshape(-1)[region.within].astype(float)) ** 2
     taps = np.exp(-0.5 * (np.arange(-2, 3) / SMOOTH_VOXELS) ** 2)
-    denoised(rough, wall, taps, HALO_VOXELS * float(np.min(scan.spacing_mm)), variance, out)
+    denoised(rough, wall, taps, HALO_VOXELS * scan.voxel_mm, variance, out)
     return out, scan.values[tuple((region.sample + corner).T)]
 
 
-_smoothed_of: weakref.WeakKeyDictionary[Grid, tuple[SearchRegion, Background]] = weakref.WeakKeyDictionary()
-"""The last background of each reference: frames share it, as it depends on reference and lumen's region alone."""
+_backgrounds = Last[Background]()
+"""Of references, by the region: frames share them."""
 
 
 def background_of(
@@ -256,8 +251,4 @@ def background_of(
         out = sparse_zeros(region.box.shape, np.float32)
         modelled(_wall_model(frame, region.corner, region, lumen), out)
         return out, None
-    known = _smoothed_of.get(reference)
-    if known is None or known[0] is not region:
-        known = region, _smoothed(reference, region, lumen, axes)
-        _smoothed_of[reference] = known
-    return known[1]
+    return _backgrounds.of(reference, region, lambda: _smoothed(reference, region, lumen, axes))

@@ -26,8 +26,8 @@ def saturated(curve: Curve, volume: Volume) -> Curve:
     """The curve; where its wire is brighter than the scan's greys go, its tip is less sure, and its levels say so."""
     if len(curve.points_mm) < 2:
         return curve
-    spacing = np.asarray(volume.spacing_mm)
-    index = np.rint(volume.to_index(resample(curve.points_mm, 0.5 * float(spacing.min())))).astype(int)
+    spacing = volume.spacing_mm
+    index = np.rint(volume.to_index(resample(curve.points_mm, 0.5 * volume.voxel_mm))).astype(int)
     near = np.clip(index + AROUND, 0, np.array(volume.shape) - 1)
     top = volume.values[tuple(np.moveaxis(near, -1, 0))] == volume.values.max()
     share = float(np.mean(top.sum(axis=0) >= TOGETHER))

@@ -75,7 +75,7 @@ class Subtraction:
         Slices thicker than the pixels are drawn together until the wire's blur is as wide along every axis (scanner
         0.8 of the smallest voxel, and the slice's own box): the kernels know one blur. Equal voxels are left alone.
         """
-        size = np.asarray(self.region.box.spacing_mm)
+        size = self.region.box.spacing_mm
         blur = np.hypot(BLUR_VOXELS * size.min(), size / np.sqrt(12))
         return np.asarray(size * blur.min() / blur)
 
@@ -98,7 +98,7 @@ class Subtraction:
     def wall_greys(self) -> tuple[float, float]:
         """Median grey of the frame well inside the lumen and just outside it."""
         grey, distance = self.region.sampled(self.scan), self.region.sample_depth
-        h = float(np.min(self.region.box.spacing_mm))
+        h = self.region.box.voxel_mm
         deep, out = distance < -h, distance > 2 * h
         inside = float(np.median(grey[deep if deep.any() else distance < h]))
         return inside, float(np.median(grey[out])) if out.any() else inside
@@ -198,7 +198,7 @@ def subtracted(frame: Volume, lumen: Lumen, reference: Volume | None) -> Subtrac
     noise = spread(grey.reshape(-1)[region.within])
     total, read = float(np.prod(grid.shape)), float(np.sum(region.runs[:, 3] - region.runs[:, 2]))
     counters = {"voxels_total": total, "voxels_read": read, "voxels_skipped": total - read}
-    blur = wall_blur(lumen, float(np.min(region.box.spacing_mm)))
+    blur = wall_blur(lumen, region.box.voxel_mm)
     levels = {"noise": noise, "gain": gain} | ({"copied": copied} if copied else {})
     image = Subtraction(region, grey, max(noise, 1e-6), reference is None, blur, grid, counters=counters, levels=levels)
     return replace(image, uneven=image.modelled and lumen.levels.get("least_filling", 1.0) < UNEVEN)
@@ -240,7 +240,7 @@ def levelled(image: Subtraction, curve: Array, sigma: float) -> Subtraction:
     the wire does not reach is averaged over about 5 voxels, carried under the wire, and out through the wall by the
     wall's own blurred step.
     """
-    voxel = float(np.min(image.region.box.spacing_mm))
+    voxel = image.region.box.voxel_mm
     index = voxels_of(image.region.runs).T
     at = tuple(index)
     distance, grey = image.region.box.values[at], image.grey[at].astype(float)

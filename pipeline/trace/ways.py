@@ -106,12 +106,3 @@ def ways_on(image: Subtraction, tip: Array, heading: Array, kept: int = KEPT, al
 def highest(ways: Array, least: float) -> float:
     """The most standard deviations of the ways (n, 2) whose mean grey is above ``least``, what a wire has; else 0."""
     return float(np.max(ways[ways[:, 0] > least, 1], initial=0.0))
-
-
-def goes_on_unseen(
-    image: Subtraction, tip: Array, heading: Array, least: float, sure: float = SURE, along: Grey | None = None
-) -> bool:
-    """Whether a way on from a tip stands out by ``sure`` standard deviations; see ``ways_on`` for the others."""
-    if highest(ways_on(image, tip, heading, QUICK, along), least) < MAYBE:
-        return False
-    return highest(ways_on(image, tip, heading, along=along), least) > sure

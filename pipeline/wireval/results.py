@@ -14,7 +14,7 @@ import pandas as pd
 from pipeline.run.results import Result, found_results
 from pipeline.status import InputError, did_you_mean
 from reports import tables
-from reports.case_files import CaseFiles, amiss, find_cases, listed, not_run, read_case
+from reports.case_files import CaseFiles, amiss, counted, find_cases, listed, not_run, read_case
 from reports.gates import gates_in
 from reports.origin import why_not_pooled
 from reports.schema import ERRORS, FAILURES, OVERALL_FILE, POINTS, SIMULATORS, SUMMARY, SWEEP, WHERE, Table
@@ -85,8 +85,8 @@ class Results:
         """What a prompt shows: where it lies, the counts, a row a case, no more than ten."""
         rows = self.summary[_SHOWN].head(10).to_string(index=False) if len(self.summary) else "no summary.csv"
         more = f"\n... and {len(self.summary) - 10} more cases" if len(self.summary) > 10 else ""
-        counted: dict[str, Sized] = {"case": self.cases, "frame": self.errors, "failure": self.failures}
-        counts = ", ".join(f"{len(of)} {name}{'s' * (len(of) != 1)}" for name, of in counted.items())
+        held: dict[str, Sized] = {"case": self.cases, "frame": self.errors, "failure": self.failures}
+        counts = ", ".join(counted(len(of), name) for name, of in held.items())
         return "\n".join([f"Results of {self.out}: {counts}", f"{rows}{more}", *self._amiss()])
 
     def _repr_html_(self) -> str:

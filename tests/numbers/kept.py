@@ -50,8 +50,8 @@ def kept(part: str, name: str) -> dict[str, np.ndarray]:
     return {key: np.array(values, float) for key, *values in words if key.partition(".")[0] == name}
 
 
-def different(part: str, name: str, numbers: Numbers, relative: float) -> list[str]:
-    """A line for each quantity that is not what it was.
+def different(part: str, name: str, numbers: Numbers, relative: float) -> str:
+    """A line for each quantity that is not what it was, and then what to do; empty where all are.
 
     relative : allowed change, by the largest value of the quantity: a component that is small beside the others has
     their rounding.
@@ -66,4 +66,4 @@ def different(part: str, name: str, numbers: Numbers, relative: float) -> list[s
         allowed = relative * np.abs(old[np.isfinite(old)]).max(initial=0.0) + ROUNDING
         if np.abs(np.nan_to_num(old - new)).max(initial=0.0) > allowed:
             lines.append(f"{key}: was {old}, is {new}, allowed {allowed:.2g}")
-    return lines
+    return "\n".join([*lines, "was that meant? then `make numbers`, and say why: see tests/numbers"]) if lines else ""

@@ -16,6 +16,7 @@ from pipeline.cli import main
 from tests.numbers.drawn import TIMED, drawn, printed, said
 from tests.numbers.imaging import TIMES, arrays, columns
 from tests.numbers.kept import Numbers, Scene, digest
+from tests.unseen import undrawn
 
 NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
 HEADS = {".nrrd": re.compile(rb"\A.*?\n\n", re.DOTALL), ".vtp": re.compile(rb"<[^>]*>")}
@@ -97,7 +98,7 @@ def study(
     scored: bool = False,
 ) -> Numbers:
     """A scene of the catalogue written and run, and all of the output read; of the score of its own wires, if so."""
-    with tempfile.TemporaryDirectory() as folder, drawn(TIMED) as looks:
+    with tempfile.TemporaryDirectory() as folder, undrawn(), drawn(TIMED) as looks:
         place = [f"{folder}/study", "--frames", str(frames), "--size", str(size), "--seed", str(seed), "-q"]
         assert main(["synth", scene, "-o", *place, "--insertions", str(insertions)]) == 0
         manifest, out = f"{folder}/study/manifest.toml", f"{folder}/out"

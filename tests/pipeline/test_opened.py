@@ -8,7 +8,7 @@ import pytest
 from pipeline.model import Curve, Lumen
 from pipeline.segment.hollows import hollows
 from pipeline.segment.opened import opened
-from pipeline.segment.pieces import in_pieces
+from pipeline.segment.pieces import between_pieces, in_pieces
 from solver.grid import Grid
 
 H = 0.3
@@ -98,6 +98,14 @@ def test_a_given_lumen_with_a_slice_missing_is_joined_where_wires_cross(gap_mm: 
     np.testing.assert_allclose(across[20, 20], -1.5, rtol=0.0, atol=0.15)
     assert np.all(across[20 - 4 : 20 + 5, 20] < 0.0)
     assert opened(lumen, [traced(wire(6.0, 2.0, 7.0))], 0.2, given=True) is lumen, "nothing crosses"
+
+
+def test_a_curve_of_few_points_may_go_from_one_piece_to_beyond_the_end_of_another() -> None:
+    """Its next point lay outside the grid, where numpy was asked for the deepest voxel of none."""
+    lumen = tube("C")
+    (gap,) = between_pieces(lumen.distance, [traced(wire(6.0, 4.0, 30.0)[[0, -1]])])
+    assert gap.radii_mm == pytest.approx((1.5, 1.5), abs=0.2)
+    assert lumen.distance.to_mm(gap.ends)[1, 2] > 17.0, "in the last millimetres of the piece"
 
 
 def test_a_hollow_in_a_given_lumen_is_told() -> None:

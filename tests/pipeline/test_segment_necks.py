@@ -7,6 +7,7 @@ import pytest
 
 from pipeline.model import Volume
 from pipeline.segment import segment
+from pipeline.segment.levels import GreyLevels, Vessel
 from pipeline.segment.necks import closed_necks
 from solver.grid import Grid
 from tests.later import later
@@ -67,4 +68,7 @@ def test_only_parts_that_go_on_as_each_other_are_joined(across: float, expected:
     other = np.maximum(np.hypot(x - 4.0 - across, y - 4.0) - 1.5, low - z)
     distance = np.minimum(first, other).astype(np.float32)
     bright = Grid(np.where(distance < 0, 1000.0, 100.0).astype(np.float32), np.full(3, H))
-    assert len(closed_necks(distance, np.zeros(3, np.int64), bright, 200)) == expected
+    vessel = Vessel(
+        bright, bright.with_values(distance), GreyLevels(1000.0, 100.0, 1.0, (1.0,)), np.ones(1, np.float32)
+    )
+    assert len(closed_necks(vessel, 200)) == expected

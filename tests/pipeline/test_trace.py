@@ -13,6 +13,7 @@ from scipy import ndimage
 from scipy.spatial import cKDTree
 from scipy.special import ndtr
 
+from pipeline.arrays.grids import in_memory_order
 from pipeline.compare.metrics import point_to_curve
 from pipeline.model import Curve, Lumen, Volume, arc_length
 from pipeline.run.log import Log
@@ -26,7 +27,7 @@ from pipeline.trace.config import TraceConfig
 from pipeline.trace.elsewhere import DARK, brightest_line, hint_of_lines, passed_by_dark
 from pipeline.trace.knots import first_tube
 from pipeline.trace.link import Path
-from pipeline.trace.region import _regions, shows_lumen
+from pipeline.trace.region import region_of, shows_lumen
 from pipeline.trace.rotation_plane import near_rotation_plane
 from pipeline.trace.subtraction import BLOCK, _smooth, levelled, subtracted, subtracting
 from pipeline.trace.tube import fit_tube
@@ -313,7 +314,8 @@ def test_memory_for_the_numbers_of_voxels_is_left_as_it_was(has_reference):
     """What one fit left in it would be voxels of the next one's wire."""
     frame, reference, lumen = scans(16)
     trace(frame, lumen, *vessel()[4:], reference=reference if has_reference else None)
-    _, region = _regions[lumen]
+    grid, axes = in_memory_order(frame)
+    region = region_of(grid, lumen, axes)
     assert region.numbers._free, "a fit works on one box at least"
     assert not any(array.any() for array in region.numbers._free)
 

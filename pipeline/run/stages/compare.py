@@ -159,7 +159,7 @@ def _tips_elsewhere(frames: Sequence[Frame], least_mm: float) -> dict[int, float
 def _rough_truth(known: Known) -> list[str]:
     """A warning of true wires whose points are so far apart that they cut corners."""
     wires = {f.index: f.truth_mm for f in known.frames if f.truth_mm is not None}
-    return rough(wires, float(min(known.vessel.distance.spacing_mm)), "the true wires", "give a point every millimetre")
+    return rough(wires, known.vessel.distance.voxel_mm, "the true wires", "give a point every millimetre")
 
 
 def _voxel_mm(known: Known) -> float:

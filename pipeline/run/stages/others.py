@@ -58,7 +58,7 @@ def frames_of_others(run: Context, known: Known) -> tuple[Frame, ...]:
         f"the simulated wires are another simulator's: {_listed(files)}; their depth counts from the clamp's plane"
     )
     wires = {f.index: f.simulated.joints_mm for f in frames if f.simulated is not None}
-    voxel_mm = float(min(known.vessel.distance.spacing_mm))
+    voxel_mm = known.vessel.distance.voxel_mm
     log.warnings += _in_another_order(frames)
     log.warnings += [*_outside(known, wires, case), *_aside(frames)]
     log.warnings += rough(wires, voxel_mm, "the simulated wires", "give a point every millimetre")
@@ -175,7 +175,7 @@ def _outside(known: Known, wires: Mapping[int, Array], case: Case) -> list[str]:
     outside = {n: np.mean(mm > radius_mm) for n, mm in beyond.items()}
     outside = {n: share for n, share in outside.items() if share > MOST_OUTSIDE}
     if not outside:
-        may = may_lie_outside_mm(float(min(known.vessel.distance.spacing_mm)), case.wall.stiffness_N_mm2)
+        may = may_lie_outside_mm(known.vessel.distance.voxel_mm, case.wall.stiffness_N_mm2)
         return _through_wall(beyond, max(FAR_RADII * radius_mm, may))
     worst = max(outside, key=lambda n: float(outside[n]))
     turned = Counter(np.mean(_clearance(known, wires[n] * MIRROR) > radius_mm) < 0.5 * outside[n] for n in outside)

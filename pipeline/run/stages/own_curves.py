@@ -88,7 +88,7 @@ def _smooth(curve: Curve) -> Curve:
 
 def _in_lumen(curve: Curve, distance: Grid, stiffness_N_mm2: float) -> Curve:
     """The curve; one of which much lies outside the lumen, further than its wall may yield, has left it."""
-    voxel = float(distance.spacing_mm.min())
+    voxel = distance.voxel_mm
     allowed = max(OUTSIDE_VOXELS * voxel, may_lie_outside_mm(voxel, stiffness_N_mm2))
     share = float(np.mean(outside_mm(distance, resample(curve.points_mm, 0.5 * voxel)) > allowed))
     if curve.refused or share <= MOST_OUTSIDE:

@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.model import Curve, Lumen
 from pipeline.run.stages.known import Frame, trusted
@@ -50,7 +49,7 @@ def too_thin(frames: Sequence[Frame], lumen: Lumen, radius_mm: float) -> list[st
 
 def not_too_thick(curve: Curve, lumen: Lumen, radius_mm: float) -> Curve:
     """The curve; ambiguous where its line is too thick for a wire of this radius: a rod, a catheter, another wire."""
-    voxel = float(np.min(lumen.distance.spacing_mm))
+    voxel = lumen.distance.voxel_mm
     seen = _seen_radius_mm(curve.levels.get("blur_mm", float("nan")), lumen, SHARPEST_VOXELS)
     most = max(MOST_SHARE * radius_mm, radius_mm + MORE_VOXELS * voxel)
     if curve.length_mm < SHORTEST_VOXELS * voxel:
@@ -72,7 +71,7 @@ def _seen_radius_mm(blur_mm: float, lumen: Lumen, least_voxels: float = 0.0, uns
     where it is unknown, and in slices that are thicker than pixels, which have a blur of their own (a ratio of 0 was
     seen).
     """
-    spacing_mm: NDArray[np.float64] = np.asarray(lumen.distance.spacing_mm)
+    spacing_mm = lumen.distance.spacing_mm
     if not spacing_mm.max() < 1.2 * spacing_mm.min():
         return float("nan")
     walls = (1.0 - unsure) * lumen.levels.get("scanner_blur_mm", np.nan)

@@ -53,7 +53,7 @@ def trace_frames(run: Context, known: Known) -> Known:
     """Every frame's wire, each with the previous one as a prior."""
     assert known.scans is not None
     given = given_curves(run)
-    voxel_mm = float(np.min(known.vessel.distance.spacing_mm))
+    voxel_mm = known.vessel.distance.voxel_mm
     if not known.scans.frames:
         if not given:
             return known

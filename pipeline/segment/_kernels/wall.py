@@ -112,8 +112,8 @@ class Wall(NamedTuple):
 
 
 @entry_point
-def dilate(mask: NDArray[Any], order: NDArray[Any], layers: int, first: int) -> None:
-    """Mark ``layers`` (PAD at most) 26-neighbour layers around the voxels ``order`` with ``first``, ``first + 1``..."""
+def dilate(mask: NDArray[Any], order: NDArray[Any], layers: int) -> None:
+    """Mark ``layers`` (PAD at most) 26-neighbour layers around the voxels ``order`` with 2, 3, ..."""
     flat, steps = mask.reshape(-1), steps_around(mask.shape, 1)
     found, begin, count = order.copy(), 0, order.shape[0]
     for layer in range(layers):
@@ -123,7 +123,7 @@ def dilate(mask: NDArray[Any], order: NDArray[Any], layers: int, first: int) -> 
                 found = grown(found)
             for step in steps:
                 if flat[found[n] + step] == 0:
-                    flat[found[n] + step] = first + layer
+                    flat[found[n] + step] = 2 + layer
                     found[count] = found[n] + step
                     count += 1
         begin = stop
