@@ -19,6 +19,7 @@ from pipeline.register.patches import LEAST_MM, SPAN_RADII
 from pipeline.register.rigid import Motion, edge_mask, rigid
 from pipeline.register.shift import Fit, StaticPoints, farthest, fit_motion, look, static_points
 from pipeline.register.slide import hidden, slid
+from pipeline.register.wider import Wider, wider
 from solver.grid import Grid
 
 __all__ = ["Anchor", "Motion", "Registration", "anchor", "register"]
@@ -52,12 +53,16 @@ BAD_MISFIT_VOXELS = 0.6
 
 @dataclass(frozen=True, eq=False)
 class Anchor:
-    """What frames are registered to: the reference scan without its padding, and points of its lumen's wall."""
+    """What frames are registered to: the reference scan without its padding, and points of its lumen's wall.
+
+    brighter : 1 where the vessel is brighter than what is around it, -1 where it is darker.
+    """
 
     reference: Volume
     wall: StaticPoints
     patch_mm: float
     padding: Padding | None = None
+    brighter: float = 1.0
 
     @cached_property
     def hides(self) -> bool:
@@ -104,6 +109,7 @@ class Registration:
     loose_mm: float = 0.0
     noise_voxels: float = 0.0
     bent: Bent = field(default_factory=Bent)
+    wider: Wider = field(default_factory=Wider)
 
     @property
     def trusted(self) -> bool:
@@ -156,7 +162,9 @@ def anchor(reference: Volume, lumen: Lumen) -> Anchor:
     reach = BAND_VOXELS * distance.voxel_mm
     band = (distance.values < reach) & (distance.values > -reach)  # without a second box of numbers
     patch_mm = max(LEAST_MM, -SPAN_RADII * float(distance.values.min()))
-    return Anchor(reference, static_points(reference, _thinned(distance, band, POINTS), patch_mm), patch_mm, padding)
+    wall = static_points(reference, _thinned(distance, band, POINTS), patch_mm)
+    deep = distance.values[tuple(np.rint(distance.to_index(wall.points_mm)).astype(np.intp).T)]
+    return Anchor(reference, wall, patch_mm, padding, 1.0 if wall.centred @ deep < 0.0 else -1.0)
 
 
 def _best(frame: Volume, to: Anchor) -> Motion:
@@ -176,10 +184,10 @@ def _best(frame: Volume, to: Anchor) -> Motion:
     return near.motion if near.misfit_voxels < CLEARLY * far.misfit_voxels else far.motion
 
 
-def _still(wall: StaticPoints, fit: Fit, moved: float) -> Registration:
+def _still(to: Anchor, fit: Fit, moved: float) -> Registration:
     """A motion that is too small to be applied."""
-    rest = bent(wall, fit.last, taken=True)
-    return Registration(moved_voxels=moved, left_voxels=moved, misfit_voxels=fit.misfit_voxels, bent=rest)
+    rest, more = bent(to.wall, fit.last, taken=True), wider(to.wall, fit.last, to.brighter, taken=True)
+    return Registration(moved_voxels=moved, left_voxels=moved, misfit_voxels=fit.misfit_voxels, bent=rest, wider=more)
 
 
 def register(frame: Volume, to: Anchor, skip_voxels: float) -> Registration:
@@ -194,7 +202,7 @@ def register(frame: Volume, to: Anchor, skip_voxels: float) -> Registration:
     first, _ = look(frame, wall, Motion(), skip_voxels)
     moved = farthest(first.motion, wall)
     if moved < skip_voxels and first.misfit_voxels < BAD_MISFIT_VOXELS:
-        return _still(wall, first, moved)
+        return _still(to, first, moved)
     motion, structures = _best(frame, to), to.structures.in_one
     if look(frame, wall, motion)[1]:
         structures = to.structures
@@ -210,6 +218,7 @@ def register(frame: Volume, to: Anchor, skip_voxels: float) -> Registration:
         noise = wall.noise_voxels(static_points(frame, wall.points_mm, to.patch_mm).noise)
         return Registration(moved_voxels=moved, left_voxels=left, misfit_voxels=last.misfit_voxels, noise_voxels=noise)
     if (far := farthest(motion, wall)) < skip_voxels:
-        return _still(wall, look(frame, wall, Motion())[0], far)
+        return _still(to, look(frame, wall, Motion())[0], far)
     shift, loose_mm, rest = motion.displacement_mm(wall.centre_mm), loose * wall.voxel_mm, bent(wall, last.last)
-    return Registration(motion, True, far, left, last.misfit_voxels, shift, loose_mm, bent=rest)
+    more = wider(wall, last.last, to.brighter)
+    return Registration(motion, True, far, left, last.misfit_voxels, shift, loose_mm, bent=rest, wider=more)

@@ -86,8 +86,8 @@ def bent(s: StaticPoints, last: Solved | None, *, taken: bool = False) -> Bent:
     count = len(s.grey)
     if last is None or len(s.starts) < 2:
         return Bent()
-    gain = np.repeat(last.gains, count) if len(last.gains) == 1 else spread_out(last.gains, s.starts, count)
-    clear = _clear(s, last, gain)
+    gain = gain_at(s, last)
+    clear = clear_of_metal(s, last, gain)
     shift, known = _shifts(s, gain, last.rest if taken else last.rest + last.change, clear)
     at, size = means(s.points_mm, s.starts), np.diff(s.starts, append=count)
     both = known[::2] & known[1::2]
@@ -97,7 +97,13 @@ def bent(s: StaticPoints, last: Solved | None, *, taken: bool = False) -> Bent:
     return Bent(centres, np.sum(one * other, axis=1), points, noise, s.voxel_mm)
 
 
-def _clear(s: StaticPoints, last: Solved, gain: Array) -> NDArray[np.bool_]:
+def gain_at(s: StaticPoints, last: Solved) -> Array:
+    """The gain (n,) of grey at each point."""
+    count = len(s.grey)
+    return np.repeat(last.gains, count) if len(last.gains) == 1 else spread_out(last.gains, s.starts, count)
+
+
+def clear_of_metal(s: StaticPoints, last: Solved, gain: Array) -> NDArray[np.bool_]:
     """Which points (n,) are away from metal: brighter than expected, and than what a wall that moved shows."""
     clear, doubtful = np.ones(len(gain), bool), np.flatnonzero(~last.clear)
     top, bottom = (spread_out(of.reduceat(s.centred, s.starts), s.starts, len(gain)) for of in (np.maximum, np.minimum))

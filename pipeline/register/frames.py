@@ -10,6 +10,7 @@ from pipeline.model import Curve, Lumen, Volume
 from pipeline.register import Anchor, Registration, anchor, register
 from pipeline.register.bent import Bent
 from pipeline.register.rigid import Motion
+from pipeline.register.wider import Wider
 from reports.alike import in_words
 from reports.case_files import frames_named
 
@@ -93,7 +94,8 @@ def sentences_of(alignment: Alignment, found: Mapping[int, Registration | None])
         if not r.trusted or (r.applied and r.doubt):
             doubtful.setdefault(r.sentence, []).append(n)
     told = [f"frame{'s' * (len(numbers) > 1)} {in_words(numbers)}: {text}" for text, numbers in doubtful.items()]
-    return texts, told + _bent([(n, r.bent) for n, r in known if r.bent.told])
+    told += _bent([(n, r.bent) for n, r in known if r.bent.told])
+    return texts, told + _wider([(n, r.wider) for n, r in known if r.wider.told])
 
 
 def _bent(found: Sequence[tuple[int, Bent]]) -> list[str]:
@@ -110,11 +112,27 @@ def _bent(found: Sequence[tuple[int, Bent]]) -> list[str]:
     ]
 
 
+def _wider(found: Sequence[tuple[int, Wider]]) -> list[str]:
+    """A warning where the wall of frames (number, by how much) lies outside, or inside, the reference's all around."""
+    if not found:
+        return []
+    number, worst = max(found, key=lambda pair: abs(pair[1].voxels))
+    side = "outside" if worst.voxels > 0.0 else "inside"
+    return [
+        f"{frames_named([n for n, _ in found])}: the vessel's wall lies {abs(worst.voxels) * worst.voxel_mm:.2f} mm "
+        f"{side} the reference's, all around (frame {number}): the reference shows another phantom, or this one at "
+        "another pressure or in another reconstruction; the lumen is the reference's, in which simulated wires have "
+        "too much or too little room, and traces are less sure by half of that; scan the reference as the frames are"
+    ]
+
+
 def widened(curve: Curve, found: Registration | None) -> Curve:
     """The curve, less sure by what no rigid motion of the phantom explains of the wall beside it."""
-    if found is None or not found.bent.told or not len(curve.points_mm):
+    if found is None or not (found.bent.told or found.wider.told) or not len(curve.points_mm):
         return curve
-    more = found.bent.off_mm(curve.points_mm) / np.sqrt(2.0)  # per axis: a wall's shift along the vessel does not show
+    more = np.full(len(curve.points_mm), found.wider.off_mm)
+    if found.bent.told:  # per axis: a wall's shift along the vessel does not show
+        more = np.hypot(more, found.bent.off_mm(curve.points_mm) / np.sqrt(2.0))
     sigma, tip = np.hypot(curve.sigma_mm, more), float(np.hypot(np.nan_to_num(curve.tip_sigma_mm), more[-1]))
     return replace(curve, sigma_mm=sigma, tip_sigma_mm=tip)
 
@@ -126,4 +144,5 @@ def record(found: Registration | None) -> dict[str, object] | None:
     names = ("applied", "moved_voxels", "left_voxels", "centre_shift_mm")
     motion = {name: getattr(found.motion, name) for name in ("angle_deg", "rotation", "shift_mm")}
     bent = {"bent_rms_voxels": found.bent.rms_voxels, "bent_most_voxels": found.bent.most_voxels}
-    return {name: getattr(found, name) for name in names} | bent | motion
+    wall = bent | {"wider_voxels": found.wider.voxels}
+    return {name: getattr(found, name) for name in names} | wall | motion
