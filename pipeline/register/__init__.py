@@ -5,7 +5,7 @@ than a tenth of a voxel is registered: by least squares from coarse to fine, or 
 not agree. The cheap look then says what is left.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 from pipeline.arrays.grids import unflattened
 from pipeline.model import Array, Lumen, Volume
 from pipeline.register.bent import Bent, bent
+from pipeline.register.branches import Branch, Shell, branch_in, shell_of
 from pipeline.register.padding import Padding, off_the_rim, padding_in, unpadded
 from pipeline.register.patches import LEAST_MM, SPAN_RADII
 from pipeline.register.rigid import Motion, edge_mask, rigid
-from pipeline.register.shift import Fit, StaticPoints, farthest, fit_motion, look, static_points
+from pipeline.register.shift import Fit, Solved, StaticPoints, farthest, fit_motion, look, static_points
 from pipeline.register.slide import hidden, slid
 from pipeline.register.wider import Wider, wider
 from solver.grid import Grid
@@ -41,6 +42,8 @@ AGREES_VOXELS = 0.5
 HELD_VOXELS = 0.5
 """What the wall alone still asks for, from which it is believed: the sides of a block that slid along itself, in air,
 held the vessel back by 1.6 to 2.5 voxels."""
+FULL_STEP = 0.95, 0.05
+"""Quantiles of grey in the wall's band between which the vessel's contrast lies."""
 WALL_POINTS = 200
 """Fewer points show no motion."""
 BAND_VOXELS = 2.0
@@ -55,14 +58,21 @@ BAD_MISFIT_VOXELS = 0.6
 class Anchor:
     """What frames are registered to: the reference scan without its padding, and points of its lumen's wall.
 
-    brighter : 1 where the vessel is brighter than what is around it, -1 where it is darker.
+    brighter : 1 where the vessel is brighter than what is around it, -1 where it is darker.  shell : what it shows
+    beside the vessel.
     """
 
     reference: Volume
     wall: StaticPoints
     patch_mm: float
-    padding: Padding | None = None
-    brighter: float = 1.0
+    padding: Padding | None
+    brighter: float
+    shell: Shell
+
+    @cached_property
+    def contrast(self) -> float:
+        """Grey of the vessel less that around it."""
+        return self.brighter * float(np.subtract(*np.quantile(self.wall.grey, FULL_STEP)))
 
     @cached_property
     def hides(self) -> bool:
@@ -110,6 +120,7 @@ class Registration:
     noise_voxels: float = 0.0
     bent: Bent = field(default_factory=Bent)
     wider: Wider = field(default_factory=Wider)
+    branch: Branch = field(default_factory=Branch)
 
     @property
     def trusted(self) -> bool:
@@ -164,7 +175,8 @@ def anchor(reference: Volume, lumen: Lumen) -> Anchor:
     patch_mm = max(LEAST_MM, -SPAN_RADII * float(distance.values.min()))
     wall = static_points(reference, _thinned(distance, band, POINTS), patch_mm)
     deep = distance.values[tuple(np.rint(distance.to_index(wall.points_mm)).astype(np.intp).T)]
-    return Anchor(reference, wall, patch_mm, padding, 1.0 if wall.centred @ deep < 0.0 else -1.0)
+    brighter = 1.0 if wall.centred @ deep < 0.0 else -1.0
+    return Anchor(reference, wall, patch_mm, padding, brighter, shell_of(reference, distance))
 
 
 def _best(frame: Volume, to: Anchor) -> Motion:
@@ -184,10 +196,19 @@ def _best(frame: Volume, to: Anchor) -> Motion:
     return near.motion if near.misfit_voxels < CLEARLY * far.misfit_voxels else far.motion
 
 
-def _still(to: Anchor, fit: Fit, moved: float) -> Registration:
+def _with_rest(found: Registration, frame: Volume, to: Anchor, last: Solved | None, *, taken: bool) -> Registration:
+    """With what the motion does not explain of the wall, and what is seen beside it. last, taken : as for ``bent``."""
+    if last is None:
+        return found
+    off, more = bent(to.wall, last, taken=taken), wider(to.wall, last, to.brighter, taken=taken)
+    branch = branch_in(frame, to.shell, found.motion, float(np.median(last.gains)), to.contrast)
+    return replace(found, bent=off, wider=more, branch=branch)
+
+
+def _still(frame: Volume, to: Anchor, fit: Fit, moved: float) -> Registration:
     """A motion that is too small to be applied."""
-    rest, more = bent(to.wall, fit.last, taken=True), wider(to.wall, fit.last, to.brighter, taken=True)
-    return Registration(moved_voxels=moved, left_voxels=moved, misfit_voxels=fit.misfit_voxels, bent=rest, wider=more)
+    found = Registration(moved_voxels=moved, left_voxels=moved, misfit_voxels=fit.misfit_voxels)
+    return _with_rest(found, frame, to, fit.last, taken=True)
 
 
 def register(frame: Volume, to: Anchor, skip_voxels: float) -> Registration:
@@ -202,7 +223,7 @@ def register(frame: Volume, to: Anchor, skip_voxels: float) -> Registration:
     first, _ = look(frame, wall, Motion(), skip_voxels)
     moved = farthest(first.motion, wall)
     if moved < skip_voxels and first.misfit_voxels < BAD_MISFIT_VOXELS:
-        return _still(to, first, moved)
+        return _still(frame, to, first, moved)
     motion, structures = _best(frame, to), to.structures.in_one
     if look(frame, wall, motion)[1]:
         structures = to.structures
@@ -218,7 +239,7 @@ def register(frame: Volume, to: Anchor, skip_voxels: float) -> Registration:
         noise = wall.noise_voxels(static_points(frame, wall.points_mm, to.patch_mm).noise)
         return Registration(moved_voxels=moved, left_voxels=left, misfit_voxels=last.misfit_voxels, noise_voxels=noise)
     if (far := farthest(motion, wall)) < skip_voxels:
-        return _still(to, look(frame, wall, Motion())[0], far)
-    shift, loose_mm, rest = motion.displacement_mm(wall.centre_mm), loose * wall.voxel_mm, bent(wall, last.last)
-    more = wider(wall, last.last, to.brighter)
-    return Registration(motion, True, far, left, last.misfit_voxels, shift, loose_mm, bent=rest, wider=more)
+        return _still(frame, to, look(frame, wall, Motion())[0], far)
+    shift, loose_mm = motion.displacement_mm(wall.centre_mm), loose * wall.voxel_mm
+    found = Registration(motion, True, far, left, last.misfit_voxels, shift, loose_mm)
+    return _with_rest(found, frame, to, last.last, taken=False)

@@ -81,10 +81,10 @@ class Bent:
         return np.asarray(self.voxel_mm * np.sqrt(np.maximum(self.power[nearest], self.rms_voxels**2)))
 
 
-def bent(s: StaticPoints, last: Solved | None, *, taken: bool = False) -> Bent:
+def bent(s: StaticPoints, last: Solved, *, taken: bool = False) -> Bent:
     """The wall's residual place by place. last : the rigid fit's last step; ``taken`` off what is left, or not."""
     count = len(s.grey)
-    if last is None or len(s.starts) < 2:
+    if len(s.starts) < 2:
         return Bent()
     gain = gain_at(s, last)
     clear = clear_of_metal(s, last, gain)

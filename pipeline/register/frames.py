@@ -9,6 +9,7 @@ from pipeline.arrays.grids import sampled, spelt
 from pipeline.model import Curve, Lumen, Volume
 from pipeline.register import Anchor, Registration, anchor, register
 from pipeline.register.bent import Bent
+from pipeline.register.branches import Branch
 from pipeline.register.rigid import Motion
 from pipeline.register.wider import Wider
 from reports.alike import in_words
@@ -95,7 +96,8 @@ def sentences_of(alignment: Alignment, found: Mapping[int, Registration | None])
             doubtful.setdefault(r.sentence, []).append(n)
     told = [f"frame{'s' * (len(numbers) > 1)} {in_words(numbers)}: {text}" for text, numbers in doubtful.items()]
     told += _bent([(n, r.bent) for n, r in known if r.bent.told])
-    return texts, told + _wider([(n, r.wider) for n, r in known if r.wider.told])
+    told += _wider([(n, r.wider) for n, r in known if r.wider.told])
+    return texts, told + _branches([(n, r.branch) for n, r in known if r.branch.told])
 
 
 def _bent(found: Sequence[tuple[int, Bent]]) -> list[str]:
@@ -123,6 +125,19 @@ def _wider(found: Sequence[tuple[int, Wider]]) -> list[str]:
         f"{side} the reference's, all around (frame {number}): the reference shows another phantom, or this one at "
         "another pressure or in another reconstruction; the lumen is the reference's, in which simulated wires have "
         "too much or too little room, and traces are less sure by half of that; scan the reference as the frames are"
+    ]
+
+
+def _branches(found: Sequence[tuple[int, Branch]]) -> list[str]:
+    """A warning where frames (number, what is seen) show a vessel beside the lumen that the reference has not."""
+    if not found:
+        return []
+    number, clearest = max(found, key=lambda pair: pair[1].cells)
+    return [
+        f"{frames_named([n for n, _ in found])}: something as bright as the filled vessel lies beside the lumen, at "
+        f"LPS mm ({spelt(clearest.at_mm)}) (frame {number}), where the reference has nothing: a branch that it "
+        "does not show, or a sheath; simulated wires cannot go there, and real ones may: scan the reference as filled "
+        "as the frames are"
     ]
 
 

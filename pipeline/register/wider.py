@@ -45,13 +45,13 @@ class Wider(NamedTuple):
         return OF_A_TRACE * abs(self.voxels) * self.voxel_mm * self.told
 
 
-def wider(s: StaticPoints, last: Solved | None, brighter: float, *, taken: bool = False) -> Wider:
+def wider(s: StaticPoints, last: Solved, brighter: float, *, taken: bool = False) -> Wider:
     """The wall's residual, on all sides alike. last, taken : as for ``bent``.
 
     brighter : 1 for a vessel that is brighter than what is around it, -1 for a darker one.
     """
     count = len(s.grey)
-    if last is None or len(s.starts) < 2:
+    if len(s.starts) < 2:
         return Wider()
     gain, grey = gain_at(s, last), last.rest if taken else last.rest + last.change
     outward = brighter * s.voxel_mm * gain * np.linalg.norm(s.gradient, axis=1)

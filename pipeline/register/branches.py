@@ -1,0 +1,106 @@
+"""Whether frames show a vessel beside the lumen where the reference has none: a branch that was filled later.
+
+The lumen is the reference's, so no wire can go there in a simulation. A branch crosses the shell of voxels that lie
+some way outside the wall. Grey is compared cell by cell, which takes noise to a third: there, a vessel stands out.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from pipeline.arrays.grids import MAD, unflattened
+from pipeline.model import Array, Volume
+from pipeline.register.rigid import Motion
+from solver.grid import Grid
+
+SHELL_VOXELS = 2.5, 5.0
+"""How far outside the wall the shell's voxels lie: beyond the blur of wall and wire, and of a wall that moved."""
+CELL_VOXELS = 3
+"""Edge of a cell."""
+FULL = 8
+"""Voxels of a cell at the least: their mean has a third of their noise."""
+AS_BRIGHT = 0.5, 1.5
+"""Shares of the vessel's contrast by which a cell is brighter than the reference where a vessel is filled; what has
+more is metal, as is what lies beside it."""
+LEAST_CELLS = 3
+"""Cells side by side: a branch of 3 voxels radius has 5 or 6, a bare wire on its way to the entry 2."""
+SURE = 6.0
+"""Noises of the cells (by what they differ where nothing is) from which one is asked."""
+APART, BESIDE_METAL = 1.8, 2.0
+"""Cell edges between the centres of two that touch, and within which metal's blur reaches."""
+
+
+class Branch(NamedTuple):
+    """How many cells side by side show a filled vessel at most, and where, (3,) LPS mm."""
+
+    cells: int = 0
+    at_mm: Array = np.zeros(3)
+
+    @property
+    def told(self) -> bool:
+        """Whether it is more than noise, and than a bare wire that passes there."""
+        return self.cells >= LEAST_CELLS
+
+
+@dataclass(frozen=True, eq=False)
+class Shell:
+    """Points (n, 3) LPS mm some way outside the wall, and the cell (n,) of each; the cells' centres (k, 3), their edge
+    and the reference's mean grey (k,) in them.
+    """
+
+    points_mm: Array
+    cell: NDArray[np.intp]
+    centre_mm: Array
+    edge_mm: float
+    grey: Array
+
+
+def shell_of(reference: Volume, distance: Grid) -> Shell:
+    """The shell of a lumen (signed distance, mm) in its reference."""
+    low, high = (v * distance.voxel_mm for v in SHELL_VOXELS)
+    index = unflattened(np.flatnonzero((distance.values > low) & (distance.values < high)), distance.shape)
+    points = distance.to_mm(index)
+    grey, inside = _grey(reference, points)
+    points, grey = points[inside], grey[inside]
+    _, cell, count = np.unique(index[inside] // CELL_VOXELS, axis=0, return_inverse=True, return_counts=True)
+    held = count[cell.ravel()] >= FULL
+    _, cell = np.unique(cell.ravel()[held], return_inverse=True)
+    centres = np.stack([_means(cell, along) for along in points[held].T], axis=1)
+    return Shell(points[held], cell, centres, CELL_VOXELS * distance.voxel_mm, _means(cell, grey[held]))
+
+
+def branch_in(frame: Volume, shell: Shell, motion: Motion, gain: float, contrast: float) -> Branch:
+    """What a frame shows beside the lumen. motion : of the phantom.  gain : of grey, frame over reference.
+
+    contrast : of the filled vessel in the reference (negative for one that is darker).
+    """
+    grey, inside = _grey(frame, motion.moved(shell.points_mm))
+    seen = _means(shell.cell, inside) == 1.0
+    if not seen.any() or not gain * contrast:
+        return Branch()
+    more = (_means(shell.cell, grey) - gain * shell.grey) / (gain * contrast)
+    more -= np.median(more[seen])
+    high = seen & (np.abs(more) > max(AS_BRIGHT[0], SURE * MAD * float(np.median(np.abs(more[seen])))))
+    metal, filled = high & (np.abs(more) > AS_BRIGHT[1]), high & (more > 0.0) & (more < AS_BRIGHT[1])
+    centres = shell.centre_mm[filled]
+    if metal.any() and len(centres):
+        centres = centres[cKDTree(shell.centre_mm[metal]).query(centres)[0] > BESIDE_METAL * shell.edge_mm]
+    if not len(centres):
+        return Branch()
+    beside = cKDTree(centres).query_ball_point(centres, APART * shell.edge_mm, return_length=True)
+    return Branch(int(np.max(beside)), motion.moved(centres[int(np.argmax(beside))]))
+
+
+def _grey(scan: Volume, points_mm: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """A scan's grey (n,) at the voxels next to points (n, 3), and which of these lie inside it."""
+    index, last = np.rint(scan.to_index(points_mm)).astype(np.intp), np.array(scan.shape) - 1
+    inside = np.all((index >= 0) & (index <= last), axis=1)
+    return scan.values[tuple(np.clip(index, 0, last).T)].astype(float), inside
+
+
+def _means(cell: NDArray[np.intp], values: NDArray[np.generic]) -> Array:
+    """Mean (k,) over each cell of values (n,)."""
+    return np.asarray(np.bincount(cell, values) / np.bincount(cell))
