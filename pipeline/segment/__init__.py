@@ -13,7 +13,7 @@ from pipeline.arrays.edges import Layer
 from pipeline.arrays.fingerprint import known_with_place
 from pipeline.arrays.grids import in_memory_order, reorder
 from pipeline.model import Lumen, Volume
-from pipeline.segment import bone, leaked, thin, uneven, valley
+from pipeline.segment import bone, leaked, noise, thin, uneven, valley
 from pipeline.segment.config import SegmentConfig
 from pipeline.segment.contact import warning
 from pipeline.segment.cut_off import cut_off
@@ -184,7 +184,8 @@ def segment(
         branches = thin.balls(grid, region.thin, site.corner, region.levels, blur)
         thin.add_balls(wall.values, np.asarray(grid.spacing_mm), branches, config.outer_mm)
     other = brighter(wall.levels, wire_radius_mm is not None) + bright + uneven.warning(found.least)
-    said = _of_the_vessel(scan, found) + warning(touching) + _beside_it(found)
+    said = noise.warning(config.scale, region.levels.noise_after(region.taps), region.levels.contrast)
+    said += _of_the_vessel(scan, found) + warning(touching) + _beside_it(found)
     said += other or bone.two_greys(*boxed, wall.blur_mm)
     box = wall.values, site.corner
     said += add_necks(region.necks, box, grid, region.levels, blur)
