@@ -97,7 +97,7 @@ def test_defaults_paths_and_order(tmp_path: Path) -> None:
         ),
         (
             ("wire = ", "uncertainty = {taper = 1e9}\nwire = "),
-            "uncertainty taper = 1000000000.0: expected a number from 0 to 3",
+            "uncertainty taper = 1000000000.0: expected 0 or a number from 1e-09 to 3",
         ),
         (("wire = ", 'phantom = " "\nwire = '), "phantom: blanks alone"),
         (("wire = ", "wall = {stiffness_N_mm2 = 1e-12}\nwire = "), "= 1e-12: expected a number from 1e-09; correct it"),
