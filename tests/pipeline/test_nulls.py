@@ -39,6 +39,13 @@ def test_the_centreline_is_the_axis_to_half_a_voxel(quarter_torus: tuple[Lumen, 
     assert rms(point_to_curve(path, axis)[0]) < 0.5 * VOXEL
 
 
+def test_a_doubtful_lumen_is_no_warning_of_python(quarter_torus: tuple[Lumen, np.ndarray]) -> None:
+    """The case has it among its warnings."""
+    lumen, axis = quarter_torus
+    steep = lumen_of(2.0 * lumen.distance.values, lumen.distance.origin_mm)
+    assert "it changes by 2 per mm" in clues_of(steep, axis).hard_wall.doubts
+
+
 def test_the_shortest_way_hugs_the_inner_wall(quarter_torus: tuple[Lumen, np.ndarray]) -> None:
     lumen, axis = quarter_torus
     path = clues_of(lumen, axis).shortest
