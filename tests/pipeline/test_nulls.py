@@ -128,6 +128,23 @@ def test_the_least_bent_curve_is_led_to_the_tip_that_it_is_told(quarter_torus: t
     assert nulls.NULLS["pinned"](clues, depth, nulls.PredictorInputs(tip_mm=free[-1] + 30.0)) is None, "out of reach"
 
 
+def test_the_last_try_counts(quarter_torus: tuple[Lumen, np.ndarray], monkeypatch: pytest.MonkeyPatch) -> None:
+    """What the last one had found was never looked at."""
+    lumen, axis = quarter_torus
+    clues, depth = clues_of(lumen, axis), 0.9 * float(arc_length(axis)[-1])
+    free, relaxed = nulls.min_bending(clues, depth), []
+    assert free is not None
+    before = free[-1] - 1.5 * (free[-1] - free[-2]) / np.linalg.norm(free[-1] - free[-2])
+    monkeypatch.setattr("pipeline.compare.pinned.relax", lambda *a, **k: relaxed.append(0) or relax(*a, **k))
+    told = nulls.PredictorInputs(tip_mm=before)
+    assert nulls.NULLS["pinned"](clues, depth, told) is not None
+    tries = len(relaxed) - 3  # along three axes before
+    monkeypatch.setattr("pipeline.compare.pinned.MOST_TRIES", tries)
+    assert nulls.NULLS["pinned"](clues, depth, told) is not None
+    monkeypatch.setattr("pipeline.compare.pinned.MOST_TRIES", tries - 1)
+    assert nulls.NULLS["pinned"](clues, depth, told) is None
+
+
 def test_the_ceiling_lies_between_the_frames_around(quarter_torus: tuple[Lumen, np.ndarray]) -> None:
     lumen, axis = quarter_torus
     line = np.array([[0.0, 0, 0], [0.0, 0, 10.0]])
