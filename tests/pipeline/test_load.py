@@ -474,10 +474,14 @@ def test_two_slices_are_a_volume_and_one_is_none(tmp_path: Path) -> None:
         read_header(tmp_path / "1.mha")
 
 
-@pytest.mark.parametrize("grey", [np.nan, -np.inf, 1e20, 1e300])
-def test_voxels_that_are_no_grey_are_refused(tmp_path: Path, grey: float) -> None:
-    """Squares of 1e20 overflowed, and no frame of its case had a result."""
-    values = numbered().astype(np.float64)
+NO_GREYS = [(np.float64, np.nan), (np.float64, -np.inf), (np.float64, 1e20), (np.float64, 1e300)]
+NO_GREYS += [(np.int32, -(2.0**31)), (np.int32, 2.0**31 - 1)]
+
+
+@pytest.mark.parametrize(("kind", "grey"), NO_GREYS)
+def test_voxels_that_are_no_grey_are_refused(tmp_path: Path, kind: type, grey: float) -> None:
+    """Squares of 1e20 overflowed, and no frame of its case had a result; whole numbers were not asked."""
+    values = numbered().astype(kind)
     values[1, 2, 3] = grey
     sitk.WriteImage(image_of(values), str(tmp_path / "scan.mha"))
     with pytest.raises(LoadError, match="1 voxels are NaN, infinite or beyond 1e"):
