@@ -40,9 +40,15 @@ def _not_tiny(value: float) -> float:
     return value
 
 
-Sigma = Annotated[NonNegative, AfterValidator(_not_tiny)]
+def _or_none(largest: float) -> tuple[AfterValidator, WithJsonSchema]:
+    """That a value from 0 to the largest is not between 0 and LEAST, for readers and for JSON schemas."""
+    above: dict[str, Any] = {"type": "number", "minimum": LEAST, "maximum": largest}
+    return AfterValidator(_not_tiny), WithJsonSchema({"anyOf": [{"const": 0}, above]})
+
+
+Sigma = Annotated[NonNegative, *_or_none(1e9)]
 """A standard deviation."""
-LogSigma = Annotated[float, Field(ge=0, le=3, allow_inf_nan=False), Number, AfterValidator(_not_tiny)]
+LogSigma = Annotated[float, Field(ge=0, le=3, allow_inf_nan=False), Number, *_or_none(3)]
 """Standard deviation of a logarithm: at 3 nothing but a factor of 20 either way is known."""
 Share = Annotated[float, Field(ge=0, le=1), Number]
 Count = Annotated[int, Field(ge=0, le=10**6), Number]
@@ -61,7 +67,7 @@ Friction = Annotated[float, Field(ge=0, le=10, allow_inf_nan=False), Number]
 Turn = Annotated[float, Field(ge=-1e5, le=1e5, allow_inf_nan=False), Number]
 """An angle, degrees."""
 Roll = Turn | Annotated[tuple[Turn, ...], Field(min_length=1)] | Literal["fit"]
-Spread = Annotated[float, Field(ge=0, le=180, allow_inf_nan=False), Number, AfterValidator(_not_tiny)]
+Spread = Annotated[float, Field(ge=0, le=180, allow_inf_nan=False), Number, *_or_none(180)]
 """Standard deviation of an angle, degrees: beyond half a turn nothing is known of it."""
 Step = Annotated[float, Field(ge=0.01, le=100, allow_inf_nan=False), Number]
 """Step along a curve, mm: below 10 µm a run would hang instead of getting more accurate."""

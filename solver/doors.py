@@ -5,10 +5,10 @@ Such a number gives a wrong wire that is called converged, so only numbers are a
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence, Set
 from numbers import Real
 from types import EllipsisType
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeGuard, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -117,6 +117,12 @@ class Found(str):
 
     __slots__ = ()
     __repr__ = str.__str__
+
+
+def listed(value: object) -> TypeGuard[Iterable[Any]]:
+    """Whether a value is a list of some kind: an array, a pandas Series, a range, a generator; no text, no set."""
+    texts_and_sets = isinstance(value, (str, bytes, Mapping, Set))
+    return isinstance(value, Iterable) and not texts_and_sets and getattr(value, "ndim", 1) > 0
 
 
 def vector(what: str, name: str, value: object, allowed: Range = ANYWHERE_MM) -> Array:

@@ -15,6 +15,14 @@ SPACING_MM = Range(1e-6, FAR_MM, "spacing is above 0: turn an axis round in `dir
 COSINES = Range(-2, 2, "columns of length 1", "of SimpleITK's nine: numpy.reshape(image.GetDirection(), (3, 3))")
 
 
+def frozen(state: dict[str, Any]) -> dict[str, Any]:
+    """What was unpickled, its arrays read-only: numpy forgets that they were."""
+    for value in state.values():
+        if isinstance(value, np.ndarray):
+            value.flags.writeable = False
+    return state
+
+
 def read_only(array: ArrayLike, dtype: Any = None) -> NDArray[Any]:
     """Return a view (a copy only if the dtype asks for one) that cannot be written to."""
     view = np.asarray(array, dtype=dtype).view()
@@ -63,11 +71,8 @@ class Grid:
             refuse("grid", "direction", self.direction.tolist(), "an orthonormal matrix", "columns of length 1")
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        """Freeze what was unpickled: numpy forgets that an array was read-only."""
-        for value in state.values():
-            if isinstance(value, np.ndarray):
-                value.flags.writeable = False
-        vars(self).update(state)
+        """Freeze what was unpickled."""
+        vars(self).update(frozen(state))
 
     @property
     def shape(self) -> tuple[int, int, int]:

@@ -6,7 +6,7 @@ Several minima exist, so a depth is reached by replaying its history, never by j
 import copy
 import math
 import threading
-from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any, Self
 
 import numpy as np
@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from solver import _tolerances as tol
 from solver.catheter import Catheter
-from solver.doors import ANGLE_DEG, FORCE_N, LENGTH_MM, Range, choice, number, numbers, unit, vector, whole
+from solver.doors import ANGLE_DEG, FORCE_N, LENGTH_MM, Range, choice, listed, number, numbers, unit, vector, whole
 from solver.entry import refused_at
 from solver.errors import refuse
 from solver.long_way import Goal, advance, check_way, nearby
@@ -150,7 +150,7 @@ class Insertion:
         self, depths_mm: Iterable[float], roll_deg: float | Sequence[float], catheter_mm: float | Sequence[float] = 0.0
     ) -> tuple[list[float], list[float], list[float]]:
         """Depths, mm, and for each a roll, degrees, and the catheter's tip, mm; ValueError where one is refused."""
-        if isinstance(depths_mm, (str, bytes, Mapping, Set)) or not isinstance(depths_mm, Iterable):
+        if not listed(depths_mm):
             refuse("insertion", "depths_mm", depths_mm, "a list of numbers of 0 or more", "write [10.0, 20.0]")
         allowed = _reach(self.wire)
         depths = _list("depths_mm", depths_mm, allowed)
@@ -269,7 +269,7 @@ def _steps(step_mm: float, roll_step_deg: float, finest_mm: float, *, rubs: bool
 
 def _each_of(name: str, values: float | Sequence[float], allowed: Range, count: int) -> list[float]:
     """A list of ``count`` numbers, one per depth, from one number for all or from a list of them."""
-    if not (isinstance(values, (list, tuple, np.ndarray)) and np.ndim(values) > 0):
+    if not listed(values):
         return [number("insertion", name, values, allowed)] * count
     each = _list(name, values, allowed)
     if len(each) != count:

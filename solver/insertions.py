@@ -12,19 +12,16 @@ from contextlib import ExitStack
 from functools import partial
 from typing import Any
 
-import numpy as np
-
 from solver import skips
 from solver._kernels.lanes.insertion import advance_together
 from solver._kernels.lanes.vectors import WIDTH
 from solver._kernels.minimise import NEWTON
 from solver.crew import Crew, Job, go_alone
-from solver.doors import Found, instance, whole
+from solver.doors import Found, instance, listed, whole
 from solver.errors import refuse
 from solver.insertion import Insertion
 from solver.solution import Solution
 
-LISTS = (list, tuple, np.ndarray)
 MOST_THREADS = 4096
 
 
@@ -66,10 +63,9 @@ class Insertions:
         """
         count = len(self.insertions)
         given: Any = list(depths_mm) if isinstance(depths_mm, Iterator) else depths_mm
-        own = isinstance(given, LISTS) and any(isinstance(depths, (*LISTS, range)) for depths in given)
+        own = listed(given) and any(listed(depths) for depths in given)
         depths = _one_each("depths_mm", given, count) if own else [given] * count
-        each = isinstance(roll_deg, LISTS) and getattr(roll_deg, "ndim", 1) > 0
-        rolls = _one_each("roll_deg", roll_deg, count) if each else [roll_deg] * count
+        rolls = _one_each("roll_deg", roll_deg, count) if listed(roll_deg) else [roll_deg] * count
         goals = [one._goals(d, r) for one, d, r in zip(self.insertions, depths, rolls, strict=True)]
         jobs = [Job(one, *goal[:2], []) for one, goal in zip(self.insertions, goals, strict=True)]
         kinds: dict[Any, deque[Job]] = {}
@@ -115,11 +111,12 @@ def _tasks(kind: deque[Job], threads: int) -> list[Callable[[], None]]:
     return [partial(crew.lead, kind) for crew in teams]
 
 
-def _one_each(name: str, values: Any, count: int) -> list[Any]:
+def _one_each(name: str, values: Iterable[Any], count: int) -> list[Any]:
     """One for each of ``count`` insertions, or a refusal."""
-    if np.shape(values)[:1] != (count,) if isinstance(values, np.ndarray) else len(values) != count:
-        refuse("insertions", name, values, f"{count} of them, as there are insertions", "give each its own")
-    return list(values)
+    each = list(values)
+    if len(each) != count:
+        refuse("insertions", name, each, f"{count} of them, as there are insertions", "give each its own")
+    return each
 
 
 def kind_of(job: Job) -> tuple[int, int, int] | None:

@@ -12,7 +12,7 @@ import numpy as np
 
 from solver import _tolerances as tol
 from solver._kernels.records import PLACE, WORK
-from solver.grid import Array
+from solver.grid import Array, frozen
 from solver.self_contact import self_overlap_mm
 
 
@@ -174,6 +174,10 @@ class Solution:
             passed_itself_mm=passed,
         )
         return solution
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Freeze what was unpickled."""
+        vars(self).update(frozen(state))
 
     @property
     def work(self) -> Mapping[str, float]:

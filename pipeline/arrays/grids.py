@@ -1,11 +1,13 @@
-"""Grids: the order of their memory, where one lies in another, and the noise in their values."""
+"""Grids: the order of their memory, where one lies in another, the noise in their values, and the wall of one."""
 
+import warnings
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from solver import VesselWall
 from solver.grid import Array, Grid, read_only
 
 MAD = 1.4826
@@ -14,6 +16,13 @@ TIED = 0.1
 """Share of all deviations that are the median from which on they are whole greys of little noise (up to 6)."""
 LATTICE_MM, LATTICE_VOXELS = 0.3, 60e6
 """Voxels of a lumen that comes without a lattice; they are larger where its box would hold more than so many."""
+
+
+def wall_of_grid(distance: Grid, stiffness_N_mm2: float = 1.0, hull: str = "offset") -> VesselWall:
+    """The wall of a signed distance. Its doubts are for the case's warnings, not for the terminal."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)
+        return VesselWall(distance, stiffness_N_mm2, hull=hull)
 
 
 def reorder(grid: Grid, axes: tuple[int, int, int]) -> Grid:

@@ -11,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
-from pipeline.arrays.grids import around
+from pipeline.arrays.grids import around, wall_of_grid
 from pipeline.arrays.polyline import at_arc, samples, smooth, to_length
 from pipeline.compare.branches import branches_of
 from pipeline.compare.config import CompareConfig
@@ -95,7 +95,7 @@ class Clues:
     @cached_property
     def hard_wall(self) -> VesselWall:
         """A hard wall around the traced wires, for ``straight_wire``."""
-        return VesselWall(self.room, stiffness_N_mm2=HARD_WALL_N_MM2)
+        return wall_of_grid(self.room, HARD_WALL_N_MM2)
 
 
 @dataclass(frozen=True, eq=False)

@@ -50,4 +50,4 @@ def pinned(wire: GuideWire, wall: VesselWall, clamp: Clamp, start_mm: Array, tip
         wrong = moved[-1] - shape[-1] - along * tangent - answer @ more
         answer = answer + np.outer(wrong, more) / max(float(more @ more), FIRST_N**2)
         force, shape = force + more, moved
-    return None
+    return shape if np.linalg.norm(tip_mm - shape[-1]) <= NEAR_MM else None

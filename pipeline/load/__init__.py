@@ -94,8 +94,9 @@ def load(header: Header, box: Box | None = None, config: LoadConfig = LoadConfig
     start, stop = box or header.box
     with told(header.source):
         values = plain(_read(header, (start, stop), config), header.source)
-    if values.dtype.kind == "f" and values.size and not -MOST_GREY <= values.min() <= values.max() <= MOST_GREY:
-        bad = int(np.size(values) - np.count_nonzero(np.abs(values) <= MOST_GREY))
+    wide = values.size and values.dtype.itemsize > 2
+    if wide and not -MOST_GREY <= values.min() <= values.max() <= MOST_GREY:
+        bad = int(np.size(values) - np.count_nonzero((values >= -MOST_GREY) & (values <= MOST_GREY)))
         why = f"{bad} voxels are NaN, infinite or beyond {MOST_GREY:.0e}; allowed: grey values up to that; replace them"
         raise unusable(header.source, why)
     made_of = Crop(header, (start, stop), config)

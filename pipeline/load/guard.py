@@ -96,6 +96,19 @@ class Deflated(io.RawIOBase):
         super().close()
 
 
+class Bunzipped(bz2.BZ2File):
+    """A file of bzip2 data as what it unpacks to; closing it closes that file, too, which BZ2File leaves open."""
+
+    def __init__(self, file: BinaryIO) -> None:
+        self.file = file
+        super().__init__(file)
+
+    def close(self) -> None:
+        """Close the file, too."""
+        super().close()
+        self.file.close()
+
+
 GZIP = b"\x1f\x8b\x08"
 """How a gzip member begins (RFC 1952)."""
 
@@ -106,7 +119,7 @@ def unpacked(path: Path, packing: str, offset: int) -> IO[bytes]:
     file.seek(offset)
     if packing == "deflate":
         return io.BufferedReader(Deflated(file), 1 << 18)
-    return bz2.BZ2File(file) if packing == "bzip2" else file
+    return Bunzipped(file) if packing == "bzip2" else file
 
 
 def told_bytes(path: Path, offset: int) -> int | None:
@@ -122,6 +135,18 @@ def told_bytes(path: Path, offset: int) -> int | None:
                 return None
             before, last = block[1 - len(GZIP) :], (last + block)[-4:]
     return int.from_bytes(last, "little")
+
+
+BZIP2_END = 0x177245385090
+"""The 48 bits after the last block of a bzip2 stream: 32 of a checksum follow, and bits up to a whole byte."""
+
+
+def ends_as_bzip2(path: Path) -> bool:
+    """Whether a file ends with its bzip2 stream: Python's reader passes over what follows one."""
+    with opened(path) as file:
+        file.seek(max(size_of(path) - 11, 0))
+        bits = int.from_bytes(file.read(), "big") >> 32
+    return any(bits >> spare & (2**48 - 1) == BZIP2_END for spare in range(8))
 
 
 def skip(file: IO[bytes], count: int, *, packed: bool) -> None:

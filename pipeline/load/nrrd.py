@@ -81,11 +81,15 @@ def head_of(path: Path) -> Head:
         raise unusable(path, f"no endian for {stored.itemsize} bytes a voxel; allowed: little, big; correct the header")
     files = _files(path, fields, shape[2] * items)
     voxel_bytes = int(np.prod(shape)) * items * channels * stored.itemsize
-    parts = tuple((name, _begin(name, path, fields, begin, voxel_bytes // len(files))) for name in files)
+    skipped, packed = _byte_skip(path, fields, packing), packing in ("deflate", "bzip2")
+    if skipped == -1:
+        parts = tuple((name, max(size_of(name) - voxel_bytes // len(files), 0)) for name in files)
+    else:
+        parts = tuple((name, _begin(name, path, fields, begin) + (0 if packed else skipped)) for name in files)
     geometry, assumed = _geometry(path, fields, vectors, int(leading))
     return Head(
-        path, shape, stored, parts, *geometry, packing=packing, items=items, channels=channels, assumed=assumed,
-        names=_segments(fields),
+        path, shape, stored, parts, *geometry, packing=packing, before=skipped if packed else 0,
+        items=items, channels=channels, assumed=assumed, names=_segments(fields),
     )  # fmt: skip
 
 
@@ -117,23 +121,29 @@ def _fields(path: Path) -> tuple[dict[str, str], int]:
     return fields, end
 
 
-def _begin(name: Path, header: Path, fields: dict[str, str], begin: int, voxel_bytes: int) -> int:
-    """The byte of a data file where its voxels (or their packing) begin."""
-    lines, skipped = (
-        int(numbers(header, fields, key, 1, whole=True, missing="0")[0]) for key in ("line skip", "byte skip")
-    )
+def _byte_skip(path: Path, fields: dict[str, str], packing: str) -> int:
+    """Bytes before the voxels, once unpacked (the format counts them so); -1: all that the voxels leave, if raw."""
+    skipped = int(numbers(path, fields, "byte skip", 1, whole=True, missing="0")[0])
+    if skipped < (0 if packing else -1):
+        encoding = fields.get("encoding", "raw")
+        why = f"byte skip {skipped} with encoding {encoding}; allowed: 0 or more, and -1 if raw"
+        raise unusable(path, f"{why}; correct the header")
+    return skipped
+
+
+def _begin(name: Path, header: Path, fields: dict[str, str], begin: int) -> int:
+    """The byte of a data file after the lines that it skips: packed or not, lines are counted as they lie there."""
+    lines = int(numbers(header, fields, "line skip", 1, whole=True, missing="0")[0])
     at = begin if name == header else 0
-    if skipped == -1:
-        return max(size_of(name) - voxel_bytes, 0)
-    if lines < 0 or skipped < 0 or lines > MOST_LINES:
-        raise unusable(header, f"line skip {lines}, byte skip {skipped}; allowed: 0 or more; correct the header")
+    if not 0 <= lines <= MOST_LINES:
+        raise unusable(header, f"line skip {lines}; allowed: 0 to {MOST_LINES}; correct the header")
     if lines:
         with opened(name) as file:
             file.seek(at)
             for _ in range(lines):
                 file.readline(LONGEST_HEADER)
             at = file.tell()
-    return at + skipped
+    return at
 
 
 MOST_LINES = 1000

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.load.geometry import Box, Header, LoadError, Source, unusable
-from pipeline.load.guard import require_room, size_of, skip, told_bytes, unpacked
+from pipeline.load.guard import ends_as_bzip2, require_room, size_of, skip, told_bytes, unpacked
 from pipeline.load.outside import misfits, to_numbers
 
 AXES, LONGEST_AXIS = (3, 4), 65535
@@ -151,8 +151,12 @@ def _require_end(file: IO[bytes], head: Head, part: int, at: int) -> None:
     """LoadError where a packed file, of which ``at`` bytes are read, holds more than the header says.
 
     Where a crop ends before the file, the rest is unpacked only if nothing else tells: a header that counts packed
-    bytes (``require_data``), or the length with which a gzip member ends (RFC 1952). bzip2 tells none: it is believed.
+    bytes (``require_data``), or the length with which a gzip member ends (RFC 1952). bzip2 tells no length: it is
+    believed where the file ends with a stream.
     """
+    if head.packing == "bzip2" and not ends_as_bzip2(head.parts[part][0]):
+        why = "it does not end with its bzip2 data: other bytes follow, or the end is missing"
+        raise unusable(head.path, f"{why}; copy the file again")
     whole = head.before + head.planes // len(head.parts) * head.plane_bytes
     if at < whole:
         if head.packing == "bzip2" or head.packed_bytes or told_bytes(*head.parts[part]) == whole % 2**32:

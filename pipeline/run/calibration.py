@@ -105,6 +105,7 @@ def gathered(cases: Sequence[Case], config: Config, store: Store, say: Say) -> G
         warnings += [f"{case.id}: {text}" for one in taken for text in _scanned_twice(case, frames, one)]
         say(f"{case.id}: {len(frames)} of {len(known.frames)} frames are fitted")
         taken.append(_taken(run, known, frames))
+        warnings += [f"{case.id}: {text}" for text in _doubtful(taken[-1].trial)]
     if not taken:
         for note in notes:
             say(note)
@@ -138,6 +139,11 @@ def _taken(run: Context, known: Known, frames: Sequence[Frame]) -> _Taken:
     stated = np.array([frame.expected_mm for frame in frames])
     voxels = tuple(frame.voxels for frame in known.frames if frame.voxels)
     return _Taken(run.case, trial, stated, voxels, tuple(map(kept, trusted(frames).values())))
+
+
+def _doubtful(trial: Trial) -> list[str]:
+    """What the solver doubts of a lumen; in a run it is a warning of the case."""
+    return [f"the lumen's signed distance: {trial.vessel.doubts}"] * bool(trial.vessel.doubts)
 
 
 def _counted_before(frames: Sequence[Frame], taken: Sequence[_Taken]) -> dict[int, str]:
@@ -225,6 +231,7 @@ def design(cases: Sequence[Case], config: Config, store: Store) -> tuple[list[Pr
         force = None if case.push_force_N is None else np.zeros(len(case.insertion_mm))
         planned.append(replace(straight_to(trial, case.insertion_mm, rolls), force_N=force))
         notes.append(f"{case.id}: {len(case.insertion_mm)} frames, voxels of {trial.voxel_mm:.2f} mm")
+        notes += [f"{case.id}: {text}" for text in _doubtful(trial)]
     try:
         return predicted(all_unknowns(cases), planned, config.solver), tuple(notes)
     except ValueError as error:

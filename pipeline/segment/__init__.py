@@ -13,7 +13,7 @@ from pipeline.arrays.edges import Layer
 from pipeline.arrays.fingerprint import known_with_place
 from pipeline.arrays.grids import in_memory_order, reorder
 from pipeline.model import Lumen, Volume
-from pipeline.segment import bone, leaked, thin, uneven, valley
+from pipeline.segment import bone, leaked, noise, thin, uneven, valley
 from pipeline.segment.config import SegmentConfig
 from pipeline.segment.contact import warning
 from pipeline.segment.cut_off import cut_off
@@ -187,7 +187,8 @@ def segment(
         branches = thin.balls(begun, region.thin, blur)
         thin.add_balls(wall.values, scan.spacing_mm, branches, config.outer_mm)
     other = brighter(wall.levels, wire_radius_mm is not None) + bright + uneven.warning(found.least)
-    said = _of_the_vessel(scan, found) + warning(touching) + _beside_it(found)
+    said = noise.warning(config.scale, region.levels.noise_after(region.taps), region.levels.contrast)
+    said += _of_the_vessel(scan, found) + warning(touching) + _beside_it(found)
     said += other or bone.two_greys(vessel, wall.blur_mm)
     said += add_necks(region.necks, begun, wall.values, blur)
     said += add_necks(closed_necks(begun, config.least_voxels), begun, wall.values, blur)

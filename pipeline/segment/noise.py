@@ -22,6 +22,9 @@ WHITE = 1.0, 0.234, 0.146
 CLEAR = 7
 """Voxels that the second and third plane reach: so far from the vessel's edge it does not count."""
 LEAST = 100
+NOISY = 0.1
+"""Most noise over contrast from which a lumen is taken: the wall's level is then 5 noises from either side, and of 3e6
+voxels one crosses it. With 0.12 the wall of tubes was off by 0.3 voxel (rms), with 0.16 by 1, with 0.3 by 3."""
 
 
 def smoothed(grey: NDArray[Any], step: int = 1) -> NDArray[Any]:
@@ -68,3 +71,13 @@ def noise_left(
         third = smoothed(second, 4)
         left.append(float(np.hypot(spread((grey - second)[outside]), spread((second - third)[outside]))) / share)
     return tuple(left)
+
+
+def warning(scale: int | None, noise: float, contrast: float) -> tuple[str, ...]:
+    """A sentence where a scale that is set leaves too much noise; scales from the noise itself leave 0.06 of 0.4."""
+    if scale is None or noise <= NOISY * contrast:
+        return ()
+    return (
+        f"segment: with segment.scale = {scale} noise is {noise / contrast:.2f} of the vessel's contrast, allowed "
+        f"{NOISY:g}: single voxels of noise pass for wall; take segment.scale out of the settings, or raise it",
+    )

@@ -1,10 +1,10 @@
 """simulate: the insertion replayed from the clamp to the depth of every frame, each from the one before."""
 
-import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import lru_cache
 
+from pipeline.arrays.grids import wall_of_grid
 from pipeline.model import Clamp, Lumen, OverWire, Wall, Wire
 from pipeline.ranges import scaled
 from pipeline.simulate.config import COARSEST_MM, Segment, SimulateConfig, SolverConfig
@@ -69,13 +69,8 @@ def together(insertions: Sequence[Insertion], ways: Sequence[Way], threads: int 
 
 @lru_cache(maxsize=1)
 def wall_of(distance: Grid, hull: str) -> VesselWall:
-    """The lumen's wall, filtered once for all insertions of a case: with 256^3 voxels that takes a second.
-
-    Its doubts are for the case's warnings, not for the terminal.
-    """
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)
-        return VesselWall(distance, stiffness_N_mm2=1.0, hull=hull)
+    """The lumen's wall, filtered once for all insertions of a case: with 256^3 voxels that takes a second."""
+    return wall_of_grid(distance, hull=hull)
 
 
 def insertion_of(

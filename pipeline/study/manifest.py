@@ -161,6 +161,8 @@ class Case(Strict):
             raise ValueError("neither frames nor insertion_mm: give scans (or traces) to compare with, or depths")
         if self.projections and (self.frames or self.traces):
             raise ValueError("projections beside frames or traces: one tells of the real wire; make two cases")
+        if self.projections and self.roll_deg == "fit":
+            raise ValueError('roll_deg = "fit" with projections: they cannot fit a roll, scans or traces can; state it')
         if not self.frames and self.reference is None and self.lumen is None:
             raise ValueError("no frames, no reference and no lumen: there is no vessel to simulate in")
         return self

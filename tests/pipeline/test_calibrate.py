@@ -31,7 +31,7 @@ from pipeline.run import calibration, calibration_files, inputs
 from pipeline.run.cache import Store
 from pipeline.run.calibrated import as_calibrated, data_of
 from pipeline.run.calibrated_wire import wire_rows
-from pipeline.run.calibration import SAME_MM, CalibrationError, depth_offset, gathered, over_insertions
+from pipeline.run.calibration import SAME_MM, CalibrationError, depth_offset, design, gathered, over_insertions
 from pipeline.run.calibration_files import contradicted, estimates_of, flattened, misfit
 from pipeline.run.inputs import described, other_file, stated, times_of
 from pipeline.run.log import Log
@@ -679,6 +679,15 @@ def test_a_clamp_of_another_case_that_a_fit_does_not_take_is_told(study):
     found = gathered(read_manifest(study / "manifest.toml").cases[:1], Config(), Store(None), lambda _: None)
     (told,) = found.warnings
     assert told.startswith('a: entry = "case:b" is for runs: its clamp is fitted with the parameters')
+
+
+def test_what_the_solver_doubts_of_a_lumen_is_told_of_its_case(study, monkeypatch):
+    """It was a UserWarning of Python on the terminal, with a path and a line of code."""
+    monkeypatch.setattr("solver.wall._doubts", lambda *_: "it is no distance")
+    cases = read_manifest(study / "manifest.toml").cases[:1]
+    (told,) = gathered(cases, Config(), Store(None), lambda _: None).warnings
+    assert told == "a: the lumen's signed distance: it is no distance"
+    assert told in design(cases, Config(), Store(None))[1]
 
 
 def test_a_case_does_not_score_itself_under_another_name(study):

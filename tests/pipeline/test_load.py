@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import bz2
 import gzip
 import struct
 import zipfile
+from collections.abc import Callable
 from pathlib import Path
 
 import h5py
@@ -120,6 +122,53 @@ def test_what_follows_packed_voxels_is_seen_wherever_a_crop_ends(tmp_path: Path,
     for added, found in ends.items():
         path.write_bytes(raw + added)
         with pytest.raises(LoadError, match=found):
+            load(read_header(path), box)
+
+
+def nrrd_of(packed: bytes, *fields: str) -> bytes:
+    """The numbered voxels' header, and what is to follow it."""
+    head = ("NRRD0004", "type: short", "dimension: 3", "sizes: 5 7 9", "endian: little", *fields)
+    return "\n".join(head).encode() + b"\n\n" + packed
+
+
+@pytest.mark.parametrize(("encoding", "pack"), [("gzip", gzip.compress), ("bzip2", bz2.compress), ("raw", bytes)])
+def test_bytes_of_an_nrrd_are_skipped_unpacked_and_lines_before_that(
+    tmp_path: Path, encoding: str, pack: Callable[[bytes], bytes]
+) -> None:
+    """Both were skipped in the packed file: sound ones were refused as damaged."""
+    path, voxels = tmp_path / "a.nrrd", numbered().tobytes(order="F")
+    for byte, line, content in (
+        (6, 0, pack(b"a head" + voxels)), (0, 2, b"two\nlines\n" + pack(voxels)), (1, 1, b"\n" + pack(b"!" + voxels)),
+    ):  # fmt: skip
+        path.write_bytes(nrrd_of(content, f"encoding: {encoding}", f"byte skip: {byte}", f"line skip: {line}"))
+        for box in (((0, 0, 0), (5, 7, 9)), ((1, 0, 2), (4, 5, 6))):
+            want = numbered()[tuple(map(slice, *box))]
+            np.testing.assert_array_equal(load(read_header(path), box).values, want)
+
+
+def test_what_an_nrrd_cannot_skip_is_refused(tmp_path: Path) -> None:
+    path, voxels = tmp_path / "a.nrrd", numbered().tobytes(order="F")
+    path.write_bytes(nrrd_of(b"a head" + voxels, "encoding: raw", "byte skip: -1"))
+    np.testing.assert_array_equal(load(read_header(path)).values, numbered())
+    refused = (
+        ("gzip", "byte skip: -1", "byte skip -1 with encoding gzip; allowed: 0 or more, and -1 if raw"),
+        ("raw", "byte skip: -2", "byte skip -2 with encoding raw"),
+        ("raw", "line skip: 1001", "line skip 1001; allowed: 0 to 1000"),
+    )
+    for encoding, skip, said in refused:
+        path.write_bytes(nrrd_of(gzip.compress(voxels), f"encoding: {encoding}", skip))
+        with pytest.raises(LoadError, match=said):
+            read_header(path)
+
+
+def test_what_follows_a_bzip2_stream_is_seen_wherever_a_crop_ends(tmp_path: Path) -> None:
+    path, voxels = tmp_path / "a.nrrd", numbered().tobytes(order="F")
+    for box in (((0, 0, 0), (5, 7, 9)), ((1, 0, 2), (4, 5, 6))):
+        for length in range(400, 440):  # the end of a stream lies anywhere in a byte
+            path.write_bytes(nrrd_of(bz2.compress(voxels[:length]) + bz2.compress(voxels[length:]), "encoding: bzip2"))
+            assert load(read_header(path), box).values[-1, -1, -1] == numbered()[tuple(np.subtract(box[1], 1))]
+        path.write_bytes(nrrd_of(bz2.compress(voxels) + b"something else", "encoding: bzip2"))
+        with pytest.raises(LoadError, match="does not end with its bzip2 data"):
             load(read_header(path), box)
 
 
@@ -425,10 +474,14 @@ def test_two_slices_are_a_volume_and_one_is_none(tmp_path: Path) -> None:
         read_header(tmp_path / "1.mha")
 
 
-@pytest.mark.parametrize("grey", [np.nan, -np.inf, 1e20, 1e300])
-def test_voxels_that_are_no_grey_are_refused(tmp_path: Path, grey: float) -> None:
-    """Squares of 1e20 overflowed, and no frame of its case had a result."""
-    values = numbered().astype(np.float64)
+NO_GREYS = [(np.float64, np.nan), (np.float64, -np.inf), (np.float64, 1e20), (np.float64, 1e300)]
+NO_GREYS += [(np.int32, -(2.0**31)), (np.int32, 2.0**31 - 1)]
+
+
+@pytest.mark.parametrize(("kind", "grey"), NO_GREYS)
+def test_voxels_that_are_no_grey_are_refused(tmp_path: Path, kind: type, grey: float) -> None:
+    """Squares of 1e20 overflowed, and no frame of its case had a result; whole numbers were not asked."""
+    values = numbered().astype(kind)
     values[1, 2, 3] = grey
     sitk.WriteImage(image_of(values), str(tmp_path / "scan.mha"))
     with pytest.raises(LoadError, match="1 voxels are NaN, infinite or beyond 1e"):

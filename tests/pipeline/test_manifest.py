@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -96,7 +97,7 @@ def test_defaults_paths_and_order(tmp_path: Path) -> None:
         ),
         (
             ("wire = ", "uncertainty = {taper = 1e9}\nwire = "),
-            "uncertainty taper = 1000000000.0: expected a number from 0 to 3",
+            "uncertainty taper = 1000000000.0: expected 0 or a number from 1e-09 to 3",
         ),
         (("wire = ", 'phantom = " "\nwire = '), "phantom: blanks alone"),
         (("wire = ", "wall = {stiffness_N_mm2 = 1e-12}\nwire = "), "= 1e-12: expected a number from 1e-09; correct it"),
@@ -472,6 +473,13 @@ def test_names_that_look_alike_are_one_or_refused() -> None:
     assert name.validate_python(" A ") == "A"
     with pytest.raises(ValidationError, match="has characters that are not seen"):
         name.validate_python("A\u200b")
+
+
+def test_projections_cannot_fit_a_roll(tmp_path: Path) -> None:
+    """It was told as a roll that is fitted on the first of 0 frames."""
+    change = 'projections = "p.json"\nlumen = "l.nrrd"\nroll_deg = "fit"\ninsertion_mm = [5, 9]'
+    said = problems(tmp_path, re.sub("(?m)^frames = .*", change, GOOD))
+    assert said.endswith('roll_deg = "fit" with projections: they cannot fit a roll, scans or traces can; state it')
 
 
 def test_projections_beside_scans_are_told(tmp_path: Path) -> None:

@@ -39,6 +39,13 @@ def test_the_centreline_is_the_axis_to_half_a_voxel(quarter_torus: tuple[Lumen, 
     assert rms(point_to_curve(path, axis)[0]) < 0.5 * VOXEL
 
 
+def test_a_doubtful_lumen_is_no_warning_of_python(quarter_torus: tuple[Lumen, np.ndarray]) -> None:
+    """The case has it among its warnings."""
+    lumen, axis = quarter_torus
+    steep = lumen_of(2.0 * lumen.distance.values, lumen.distance.origin_mm)
+    assert "it changes by 2 per mm" in clues_of(steep, axis).hard_wall.doubts
+
+
 def test_the_shortest_way_hugs_the_inner_wall(quarter_torus: tuple[Lumen, np.ndarray]) -> None:
     lumen, axis = quarter_torus
     path = clues_of(lumen, axis).shortest
@@ -119,6 +126,23 @@ def test_the_least_bent_curve_is_led_to_the_tip_that_it_is_told(quarter_torus: t
     assert bending(guess) > bending(free)
     assert nulls.NULLS["pinned"](clues, depth, nulls.PredictorInputs()) is None
     assert nulls.NULLS["pinned"](clues, depth, nulls.PredictorInputs(tip_mm=free[-1] + 30.0)) is None, "out of reach"
+
+
+def test_the_last_try_counts(quarter_torus: tuple[Lumen, np.ndarray], monkeypatch: pytest.MonkeyPatch) -> None:
+    """What the last one had found was never looked at."""
+    lumen, axis = quarter_torus
+    clues, depth = clues_of(lumen, axis), 0.9 * float(arc_length(axis)[-1])
+    free, relaxed = nulls.min_bending(clues, depth), []
+    assert free is not None
+    before = free[-1] - 1.5 * (free[-1] - free[-2]) / np.linalg.norm(free[-1] - free[-2])
+    monkeypatch.setattr("pipeline.compare.pinned.relax", lambda *a, **k: relaxed.append(0) or relax(*a, **k))
+    told = nulls.PredictorInputs(tip_mm=before)
+    assert nulls.NULLS["pinned"](clues, depth, told) is not None
+    tries = len(relaxed) - 3  # along three axes before
+    monkeypatch.setattr("pipeline.compare.pinned.MOST_TRIES", tries)
+    assert nulls.NULLS["pinned"](clues, depth, told) is not None
+    monkeypatch.setattr("pipeline.compare.pinned.MOST_TRIES", tries - 1)
+    assert nulls.NULLS["pinned"](clues, depth, told) is None
 
 
 def test_the_ceiling_lies_between_the_frames_around(quarter_torus: tuple[Lumen, np.ndarray]) -> None:

@@ -89,6 +89,15 @@ def test_what_is_pickled_stays_read_only() -> None:
     assert isinstance(back(wall).distance, Grid)
 
 
+def test_a_pickled_solution_stays_read_only() -> None:
+    (found,) = straight().to_depths([3.0])
+    for back in (copy.deepcopy, lambda thing: pickle.loads(pickle.dumps(thing))):
+        again = back(found)
+        for name in ("joints_mm", "frames", "contact_force_N", "reaction_force_N"):
+            assert not getattr(again, name).flags.writeable, name
+            np.testing.assert_array_equal(getattr(again, name), getattr(found, name))
+
+
 def test_an_earlier_call_is_ended_by_a_later_one() -> None:
     push = straight()
     first, second = push.to_depths([2.0, 4.0, 6.0]), push.to_depths([3.0, 5.0])

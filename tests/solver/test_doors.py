@@ -380,6 +380,21 @@ def test_a_depth_is_refused_at_the_call_and_moves_nothing() -> None:
     assert push.depth_mm == 5.0
 
 
+def series(values: list[float]) -> Any:
+    return pytest.importorskip("pandas").Series(values)
+
+
+@pytest.mark.parametrize("kind", [tuple, np.array, series, iter, lambda values: range(1, 1 + len(values))])
+def test_lists_of_any_kind_are_taken_alike(kind: Callable[[list[float]], Any]) -> None:
+    """Depths were taken as a range or a Series, rolls were not."""
+    values = [1.0, 2.0]
+    want = [*insertion().to_depths([1.0, 2.0], [1.0, 2.0])]
+    found = [*insertion().to_depths(kind(values), kind(values))]
+    assert [(s.depth_mm, s.roll_deg) for s in found] == [(s.depth_mm, s.roll_deg) for s in want]
+    both = Insertions([insertion(), insertion()]).to_depths(kind(values), kind([1.0, 2.0]))
+    assert [[s.roll_deg for s in each] for each in both] == [[1.0, 1.0], [2.0, 2.0]]
+
+
 def test_what_is_given_is_copied() -> None:
     values, spacing, rows, entry = np.array(tube_grid().values), np.ones(3), np.array([[0.0, 1.0]]), np.zeros(3)
     box, soft = Grid(values, spacing), GuideWire(1.0, 0.1, rows)

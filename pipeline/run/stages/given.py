@@ -9,8 +9,8 @@ from pipeline.calibrate.trials import Trial
 from pipeline.model import Clamp
 from pipeline.run.stages.known import Context, Frame, Known
 from pipeline.run.stages.way import passed_at
+from pipeline.simulate import wall_of
 from pipeline.simulate.clamp import Prior, TracedFrame
-from solver import VesselWall
 
 ENTRY_SIGMA_VOXELS = 0.5
 """Standard deviation, voxels, of an entry point picked in a scan, where the manifest states none."""
@@ -59,7 +59,7 @@ def trial_of(
     return Trial(
         name=case.id,
         group=case.group,
-        vessel=VesselWall(known.vessel.distance, stiffness_N_mm2=1.0, hull=run.config.solver.hull),
+        vessel=wall_of(known.vessel.distance, run.config.solver.hull),
         wire=case.wire,
         wall=case.wall,
         given=given,
