@@ -36,6 +36,7 @@ Sentences on pages and on the terminal:
 
 ===================  ==================================================================================
 ``verdict``          how far the wire is off, and whether that is better than a guess
+``few_insertions``   what few insertions tell: a wide interval, or nothing about others
 ``worse``            the cases that a number over all of them hides
 ``doubts``           what is doubtful or assumed of the cases of a run
 ``gates``            what was asked of a run with ``--fail-if``, and the answers

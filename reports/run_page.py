@@ -38,9 +38,9 @@ from reports.sweep import not_run_sentence as not_swept_sentence
 from reports.sweep import silent_points
 from reports.tables import first_row, in_texts, read_if_there
 from reports.unscored import unscored
-from reports.verdict import badge, first_that_holds, headline, of_these_alone
+from reports.verdict import badge, first_that_holds, headline
 from reports.what_next import next_command, typed, worst_frames
-from reports.worse import worse_cases, worse_sentence
+from reports.worse import one_case, worse_cases, worse_sentence
 
 
 def render_index(out_dir: Path, embed: bool = False, each: Each = one_by_one) -> Path:
@@ -62,7 +62,7 @@ def render_index(out_dir: Path, embed: bool = False, each: Each = one_by_one) ->
     why["sweep incomplete"] = aside["not_swept"]
     page = {
         **_headline(cases, missing, damaged),
-        **_judged(out_dir, cases, first_that_holds(why), row, why_none),
+        **_judged(out_dir, cases, first_that_holds(why), row, why_none, one_case(summary.to_dict("records"))),
         **_worse_cases(summary, links),
         "worst": worst_frames({n: t for n, t in files.errors.items() if n not in uncounted}, links),
         # of several shards' commands none is the one of the run
@@ -176,13 +176,15 @@ def _simulator(cases: Sequence[CaseFiles]) -> str:
 
 
 def _judged(
-    out_dir: Path, cases: Sequence[CaseFiles], status: str, row: Mapping[str, Any], why_none: str
+    out_dir: Path, cases: Sequence[CaseFiles], status: str, row: Mapping[str, Any], why_none: str, hidden: str
 ) -> dict[str, Any]:
-    """Badge, verdict and warnings over all cases. row : of overall.csv.     why_none : why there may be no verdict."""
+    """Badge, verdict and warnings over all cases. row : of overall.csv.     why_none : why there may be no verdict.
+    hidden : what of one case the numbers over all hide.
+    """
     caveats = caveats_of(out_dir, {case.name: case.result for case in cases})
     said, more = headline(row, _simulator(cases), caveats)
-    told = {"verdict": said or why_none, "more": [*more, *filter(None, [not caveats.copied and of_these_alone(row)])]}
-    return told | {"badge": badge(status, status == "ok", row, caveats), "warnings": caveats.warnings}
+    shown = badge(status, status == "ok", row, caveats, hidden)
+    return {"verdict": said or why_none, "more": more, "badge": shown, "warnings": caveats.warnings}
 
 
 def _headline(cases: list[CaseFiles], missing: Sequence[str], damaged: Container[str]) -> dict[str, str]:

@@ -69,6 +69,7 @@ def render_simulators(out_dir: Path, embed: bool = False) -> Path:
             for rival in dict.fromkeys(one["rival"] for one in told if one["rival"])
         },
         "ours": OURS if OURS in folders else "",
+        "shared": _shared(folders.get(OURS), links.get(OURS, "")),
         "interval": next(iter(table["interval"].dropna()), ""),
         "simulators": grid,
         "few": in_common(files.simulators),
@@ -103,7 +104,8 @@ def _said(
     failed = good < alone["frames"]
     why = {"cases missing": missing, "frames failed": failed, "not pooled": mixed, "gate closed": closed}
     status = first_that_holds(why)
-    off_scans = [text for text in caveats_in(folder).warnings if OFF_THE_SCANS in text]
+    on_its_page = caveats_in(folder).warnings
+    off_scans = [text for text in on_its_page if OFF_THE_SCANS in text]
     in_line = [line for line in lines if MOSTLY_LINES in line]
     caveats = Caveats("" if missing or failed or mixed else copied, twins(doubted(folder)), [*off_scans, *in_line])
     said, more = headline(row, alone["simulator"], caveats, defined=False)
@@ -114,7 +116,7 @@ def _said(
     more += filter(None, [beside, f"Of the study {missing}." * bool(missing)])
     rest = len(lines) - _MOST_WARNINGS
     return {
-        "badge": badge(status, status == "ok", row, caveats),
+        "badge": badge(status, status == "ok", row, caveats._replace(warnings=on_its_page)),
         "verdict": said,
         "more": more,
         "rival": str(rival) if pd.notna(rival) else "",
@@ -125,6 +127,14 @@ def _said(
             *[f"{counted(rest, 'more warning')} on the pages of its cases"] * (rest > 0),
         ],
     }
+
+
+def _shared(ours: Path | None, link: str) -> dict[str, str]:
+    """How many warnings stand on the page of our own wires, and where: below they are left out, as the same scans,
+    lumen and clamp give them to all.
+    """
+    count = len(caveats_in(ours).warnings) if ours else 0
+    return {"count": counted(count, "warning"), "link": link} if count else {}
 
 
 def _without_others(skill: Any, frames: Any, beside: Mapping[str, Any]) -> str:

@@ -8,12 +8,11 @@ from typing import Any
 from reports._content import NOTHING, fewer_frames, interval, length, number, predictor_label, value_of
 from reports.case_files import counted
 from reports.doubts import NO_CAVEATS, Caveats
+from reports.few_insertions import alone_in, of_these_alone, over_few, wide_over_few
 from reports.schema import OURS, SUMMARY
 from reports.tips import tips_off
 
 _LISTS = re.compile(r" \([^()]*\b(?:frame|case)s? [^()]*\)")  # frame after frame, which the warning itself has
-_WITHHELD = re.compile(r"withheld: (\d+) insertion")
-_FEW = re.compile(r"from (.*) only")  # the note on an interval over few insertions
 
 
 def verdict(statistics: Mapping[str, Any], simulator: str = "", caveats: Caveats = NO_CAVEATS) -> str:
@@ -60,6 +59,7 @@ def _sentences(
         (tips_off(statistics), True),
         (against, True),
         (weaker, True),
+        (of_these_alone(alone_in(statistics, *_skill(statistics)[1:])), True),
         (few, False),
         (_unknown_roll(statistics, simulator, caveats), True),
         (again, True),
@@ -73,7 +73,7 @@ def _far(statistics: Mapping[str, Any], simulator: str, rms: str) -> str:
     whose = f"he wire of {simulator}" if simulator else "he simulated wire"
     some = _of_frames(statistics)
     sentence = f"{f'On {some} alone t' if some else 'T'}{whose} lies {rms} mm (rms) from the traced one"
-    few = _over_few(statistics)
+    few = over_few(statistics)
     sentence += f", 95 % interval {ends} mm" + f" (from {few} only)" * bool(few) if ends else ""
     tail = length(statistics.get("p95_mm"))
     return sentence + (f"; 95 % of its points lie within {tail} mm." if tail != NOTHING else ".")
@@ -177,22 +177,29 @@ def first_that_holds(words: Mapping[str, Any]) -> str:
     return next((word for word, so in words.items() if so), "ok")
 
 
-def badge(status: str, good: bool, statistics: Mapping[str, Any], caveats: Caveats = NO_CAVEATS) -> dict[str, str]:
+def badge(
+    status: str, good: bool, statistics: Mapping[str, Any], caveats: Caveats = NO_CAVEATS, one_case: str = ""
+) -> dict[str, str]:
     """The word beside a heading, and its look: good, poor (no better than a guess, though nothing failed) or bad.
 
     statistics : a row of summary.csv or overall.csv, empty where nothing was scored. What is ok and has warnings says
-    how many, and is poor where one of them speaks against an input; its ``link`` leads to them.
+    how many, and is poor where one of them speaks against an input; its ``link`` leads to them. So is what too few
+    insertions show.     one_case : what one case is that the numbers of all hide.
     """
     if good and caveats.copied:
         return {"text": COPIED, "look": "bad"}
-    poor = (TWINS if caveats.twins else standing(statistics)) if good else ""
-    if poor == NOT_SHOWN and _skill(statistics)[1] > 0.0 and _few_insertions(statistics):
+    poor = (TWINS if caveats.twins else standing(statistics) or one_case) if good else ""
+    if poor == NOT_SHOWN and _skill(statistics)[1] > 0.0 and wide_over_few(statistics):
         # wires of skill 0.97, 0.44 and 0.07 had one badge, as if none were any good
         poor = f"skill {number(_skill(statistics)[1])}: {TOO_FEW}"
-    if good and not poor and caveats.warnings:
-        text = f"{status}, {counted(len(caveats.warnings), 'warning')}"
-        return {"text": text, "look": "poor" if caveats.against else "good", "link": "#warnings"}
-    return {"text": poor or status, "look": "poor" if poor else "good" if good else "bad"}
+    if not good or poor:
+        return {"text": poor or status, "look": "poor" if poor else "bad"}
+    alone = alone_in(statistics, *_skill(statistics)[1:])
+    text = f"skill {number(_skill(statistics)[1])}: {alone} about others" if alone else status
+    look = {"look": "poor" if alone or caveats.against else "good"}
+    if not caveats.warnings:
+        return {"text": text, **look}
+    return {"text": f"{text}, {counted(len(caveats.warnings), 'warning')}", **look, "link": "#warnings"}
 
 
 def _skill(statistics: Mapping[str, Any]) -> tuple[str, float, float, float]:
@@ -241,7 +248,7 @@ def _against(statistics: Mapping[str, Any], *, defined: bool) -> tuple[str, str,
         NOT_SHOWN: f"It is not shown to be better ({unsure})",
     }
     how = said.get(standing(statistics), f"The wire is better ({value})")
-    few = _few_insertions(statistics) if least <= 0.0 < skill else ""
+    few = wide_over_few(statistics) if least <= 0.0 < skill else ""
     how, weaker = (f"On these frames {how[0].lower()}{how[1:]}", _WEAKER) if _of_frames(statistics) else (how, "")
     return f"{how} than {rival}.", few, weaker
 
@@ -251,27 +258,6 @@ _WEAKER = (
     "Frames failed, so the predictors 'previous frame' and 'another insertion' had fewer wires to guess from: the "
     "skill may look better than it is."
 )
-
-
-def _few_insertions(statistics: Mapping[str, Any]) -> str:
-    """Whose doing it is that an interval over few insertions is wide: not the wire's alone."""
-    few = _over_few(statistics)
-    return f"Intervals over {few} are wide, even of a perfect wire: scan six or more." * bool(few)
-
-
-def _over_few(statistics: Mapping[str, Any]) -> str:
-    """Over how many insertions intervals are, where that makes them wide; else empty."""
-    found = _FEW.fullmatch(str(statistics.get("interval")).partition("; ")[0])
-    return found[1] if found else ""
-
-
-def of_these_alone(statistics: Mapping[str, Any]) -> str:
-    """That a skill without an interval is only about the insertions at hand: three give a wide one."""
-    found = _WITHHELD.search(str(statistics.get("interval")))
-    if not found or not _skill(statistics)[1] > 0.0:
-        return ""
-    who = "One insertion says" if found[1] == "1" else f"{found[1]} insertions say"
-    return f"{who} nothing about others: scan three for an interval, six for a narrow one."
 
 
 def _of_frames(statistics: Mapping[str, Any]) -> str:

@@ -25,6 +25,13 @@ def worse_sentence(rows: Sequence[Mapping[Any, Any]]) -> str:
     return " ".join(filter(None, (said, _far_off(rows))))
 
 
+def one_case(rows: Sequence[Mapping[Any, Any]]) -> str:
+    """What the sentence says, for a badge."""
+    if len(_scored(rows)) > 1 and worse_cases(rows):
+        return f"a case is {WORSE}"
+    return "a case lies far off" * bool(_far_off(rows))
+
+
 FAR_OFF, FAR_OFF_MM = 4.0, 0.2
 """Times the median case's rms, and mm, from which a case has an error of its own: those of `make validate` are within
 1.3 times. It makes an interval as wide as may be, which more insertions would not mend."""

@@ -17,20 +17,34 @@ class Terminated(KeyboardInterrupt):
 
 @contextmanager
 def ended_by_signal() -> Iterator[None]:
-    """Let SIGTERM end a command as Ctrl-C does, and let neither be lost."""
+    """Let SIGTERM end a command as Ctrl-C does, and let neither be lost.
+
+    A compiled module whose import it ends makes an ImportError of it: that would be exit code 1, to diff a regression.
+    """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
 
-    def end(number: int, frame: object) -> None:
-        raise Terminated
+    told: list[KeyboardInterrupt] = []
 
-    before = signal.signal(signal.SIGTERM, end)
+    def end(number: int, frame: object) -> None:
+        told.append(Terminated() if number == signal.SIGTERM else KeyboardInterrupt())
+        raise told[-1]
+
+    # what a script starts in the background ignores Ctrl-C, and goes on to
+    listens = signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    before = {n: signal.signal(n, end) for n in (signal.SIGTERM, *[signal.SIGINT] * listens)}
     try:
         with _none_lost():
             yield
+    except Exception:
+        if not told:
+            raise
     finally:
-        signal.signal(signal.SIGTERM, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)
+    if told:
+        raise told[-1]
 
 
 @contextmanager

@@ -54,7 +54,7 @@ class Format(Protocol):
         """Its geometry; raises LoadError where it cannot be used."""
 
     def read(self, header: Header, box: Box, config: LoadConfig, /) -> NDArray[Any]:
-        """Voxels of a box, indexed x, y, z."""
+        """Voxels of a box, indexed x, y, z, in any order of memory."""
 
 
 FORMATS: tuple[Format, ...] = (dicom, hdf5, files)
@@ -90,10 +90,14 @@ def read_header(
 
 
 def load(header: Header, box: Box | None = None, config: LoadConfig = LoadConfig()) -> Volume:
-    """Voxels of a scan, indexed x, y, z, with its geometry; of ``box`` alone where one is given."""
+    """Voxels of a scan, indexed x, y, z, with its geometry; of ``box`` alone where one is given.
+
+    x is fastest in memory, whatever the file has: stages go through voxels in the order of memory and take samples of
+    them, and other samples make another sigma (0.0199 for 0.0207 mm).
+    """
     start, stop = box or header.box
     with told(header.source):
-        values = plain(_read(header, (start, stop), config), header.source)
+        values = np.asfortranarray(plain(_read(header, (start, stop), config), header.source))
     wide = values.size and values.dtype.itemsize > 2
     if wide and not -MOST_GREY <= values.min() <= values.max() <= MOST_GREY:
         bad = int(np.size(values) - np.count_nonzero((values >= -MOST_GREY) & (values <= MOST_GREY)))

@@ -7,6 +7,9 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from reports.figures import _any_backend  # noqa: F401 - first: it imports matplotlib
+
+# isort: split
 from reports.figures._drawing import Drawing
 from reports.figures.run import RunFiles
 

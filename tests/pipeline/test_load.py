@@ -290,6 +290,7 @@ def test_an_hdf5_group_of_volumes_is_a_sequence_with_either_axis_order(tmp_path:
     assert (header.item_count, header.shape) == (3, (5, 7, 9))
     last = load(list(each_volume(header))[2], ((0, 1, 2), (5, 3, 4)))
     np.testing.assert_array_equal(last.values, (numbered() + 2)[:, 1:3, 2:4])
+    assert last.values.flags.f_contiguous  # stages sample voxels in memory's order: sigma was 4 % larger in the other
     np.testing.assert_allclose(last.origin_mm, header.grid.to_mm([0, 1, 2]))
 
 
@@ -360,7 +361,9 @@ def test_a_dicom_series_is_sorted_by_position(tmp_path: Path) -> None:
     np.testing.assert_allclose(header.spacing_mm, SPACING, rtol=1e-6)
     np.testing.assert_allclose(header.origin_mm, ORIGIN)
     np.testing.assert_array_equal(load(header).values, numbered())
-    np.testing.assert_array_equal(load(header, ((1, 2, 3), (4, 6, 8))).values, numbered()[1:4, 2:6, 3:8])
+    crop = load(header, ((1, 2, 3), (4, 6, 8))).values
+    np.testing.assert_array_equal(crop, numbered()[1:4, 2:6, 3:8])
+    assert crop.flags.f_contiguous
 
 
 @pytest.mark.parametrize("content", [b"", b"no DICOM", None])

@@ -20,6 +20,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from pipeline.__main__ import main as as_program
 from pipeline.cli import main
 from pipeline.model import Curve
 from pipeline.run import launch, ledger
@@ -617,6 +618,7 @@ def test_an_executor_that_is_not_there_is_refused(
 
 AT_A_FORK = """
 import os, signal, sys
+from pipeline.__main__ import main as as_program
 from pipeline.cli import main
 os.register_at_fork(after_in_parent=lambda: os.kill(os.getpid(), int(sys.argv[1])))
 sys.exit(main(["synth", "straight", "-o", sys.argv[2], "--size", "72", "--insertions", "2", "-j", "2"]))
@@ -640,6 +642,38 @@ def test_signals_have_their_exit_codes(
     monkeypatch.setattr("pipeline.run.case.run_stages", lambda *_: os.kill(os.getpid(), number))
     assert run(study, tmp_path / "out") == code
     assert signal.getsignal(signal.SIGTERM) == before
+
+
+def test_a_signal_of_which_an_import_makes_an_error_is_not_lost(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As pybind11 does: a traceback and exit code 1, which is a regression where diff was interrupted."""
+
+    def imported(_: object) -> int:
+        try:
+            os.kill(os.getpid(), signal.SIGINT)
+        except KeyboardInterrupt:
+            raise ImportError("initialization failed") from None
+        return 0
+
+    monkeypatch.setattr("pipeline.cli.carried_out", imported)
+    assert main(["diff", "a", "b"]) == 130
+    assert capsys.readouterr().err == "\ninterrupted\n"
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_ctrl_c_before_the_command_line_is_there_has_its_exit_code(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    class Pressed:
+        def find_spec(self, *_: object) -> None:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(sys, "meta_path", [Pressed()])
+    monkeypatch.delitem(sys.modules, "pipeline.cli")
+    monkeypatch.delattr("pipeline.cli")
+    assert as_program() == 130
+    assert capsys.readouterr().err == "\ninterrupted\n"
 
 
 @pytest.mark.parametrize(

@@ -464,7 +464,10 @@ def test_the_page_says_how_good_each_is_and_what_was_warned_of(compared: Path) -
             tables.write(folder / "failures.csv", FAILURES, [why | {"frame": frame} for frame in (1, 3)])
     page = render_simulators(compared).read_text(encoding="utf-8")
     assert '<span class="status poor">worse than a guess</span>' in page
-    assert page.count('<span class="status good">ok</span>') == 1
+    assert '<a class="status good" href="index.html#warnings">ok, 1 warning</a>' in page, (
+        "ok, where its own page counts"
+    )
+    assert '<a href="simulators/wireval/index.html#warnings">1 warning on the page of wireval</a>' in page
     assert "On 21 of 24 planned frames alone the wire of worse lies" in page
     assert "<li>c0, frames 1, 3: curve_missing: there is no wire</li>" in page, "it listed them without a reason"
     assert '<a href="simulators/worse/index.html#failures">all failures, and what to do</a>' in page

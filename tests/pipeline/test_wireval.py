@@ -57,6 +57,15 @@ def test_an_own_file_of_the_name_of_a_package_is_named(tmp_path: Path, name: str
     assert "rename it" in done.stderr
 
 
+@pytest.mark.parametrize(("named", "left"), [("nonsense", "agg"), ("module://not.there", "module://not.there")])
+def test_a_notebook_s_backend_is_its_own(named: str, left: str) -> None:
+    """Jupyter sets MPLBACKEND for ! commands, too: where the backend is not installed, each ended in a ValueError."""
+    asked = "import os, wireval, matplotlib; print(matplotlib.get_backend(), os.environ['MPLBACKEND'])"
+    given = [sys.executable, "-c", asked]
+    done = subprocess.run(given, env={**os.environ, "MPLBACKEND": named}, capture_output=True, text=True, check=False)
+    assert (done.stdout.split(), done.stderr) == ([left, named], "")
+
+
 def test_a_check_gives_sentences(study: Path, tmp_path: Path) -> None:
     assert wireval.check(study) == []
     assert wireval.check(tmp_path / "none.toml") == [f"{tmp_path / 'none.toml'}: no such manifest"]

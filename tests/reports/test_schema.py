@@ -12,8 +12,9 @@ from reports.case_files import read_case
 from reports.case_page import render_case
 from reports.figures import Drawing, figures_of
 from reports.figures._style import LINES, predictors
+from reports.result_file import COUNTED
 from reports.run_page import render_index
-from reports.schema import ERRORS, PLACES, SUMMARY, Column, predictor
+from reports.schema import ERRORS, PLACES, SUMMARY, SWEEP, Column, Table, predictor
 from tests.reports.fake_results import FakeCase, write_run
 from tests.unseen import scarce as scarce
 
@@ -98,6 +99,13 @@ def test_many_predictors_still_have_lines() -> None:
     for i in range(9):
         ERRORS.add(predictor(f"guess_{i}", f"guess {i}", "anything"))
     assert len(list(predictors())) == 13
+
+
+@pytest.mark.parametrize("table", [SUMMARY, SWEEP])
+def test_what_is_counted_as_ok_is_what_is_said(table: Table) -> None:
+    """A case without scans counts its simulated frames, of which "traced and compared" was said."""
+    assert COUNTED == ("ok", "simulated")
+    assert table["frames_ok"].meaning.endswith("of a case without scans or traces those that were simulated")
 
 
 def test_a_column_goes_to_the_end() -> None:

@@ -9,9 +9,9 @@ import pytest
 
 from reports.doubts import MOSTLY_LINES, OFF_THE_SCANS, Caveats, weightiest_first
 from reports.unscored import unscored
-from reports.verdict import badge, headline, in_short, of_these_alone, remarks, verdict
+from reports.verdict import badge, headline, in_short, remarks, verdict
 from reports.what_next import next_command, typed, warned, worst_frames
-from reports.worse import worse_sentence
+from reports.worse import one_case, worse_sentence
 from tests.reports.fake_results import FakeCase, write_run
 
 
@@ -58,14 +58,21 @@ def test_an_error_that_inputs_do_not_explain_is_told() -> None:
 
 
 def test_a_skill_of_one_insertion_says_nothing_of_others() -> None:
-    """Three insertions were "not shown to be better"; with one group for them the same wires were better, full stop."""
-    row = {"skill_strongest": 0.988, "strongest_null": "previous"}
-    alone = "interval withheld: 1 insertion, at least 3 needed"
-    assert of_these_alone(row | {"interval": alone}).startswith("One insertion says nothing about others: scan")
-    two = {"interval": alone.replace("1 insertion", "2 insertions")}
-    assert of_these_alone(row | two).startswith("2 insertions say nothing")
-    assert not of_these_alone(row | {"interval": "from 3 insertions only"})
-    assert not of_these_alone(row | {"interval": alone, "skill_strongest": -0.1}), "that is worse, of whatever"
+    """One insertion of skill 0.07 was a green ok and better; four of the same skill were not shown to be better."""
+    row = {"rms_mm": 0.2, "skill_strongest": 0.0675, "strongest_null": "previous"}
+    one = row | {"interval": "interval withheld: 1 insertion, at least 3 needed"}
+    two = row | {"interval": "interval withheld: 2 insertions, at least 3 needed"}
+    assert "One insertion shows nothing about others: an interval needs three" in headline(one)[0]
+    assert "2 insertions show nothing about others" in headline(two)[0]
+    shown = {"text": "skill 0.0675: one insertion shows nothing about others", "look": "poor"}
+    assert badge("ok", True, one) == shown
+    assert badge("ok", True, one, Caveats(warnings=("few points",))) == {
+        "text": f"{shown['text']}, 1 warning",
+        "look": "poor",
+        "link": "#warnings",
+    }
+    for other in (row | {"interval": "from 3 insertions only"}, one | {"skill_strongest": -0.1}):
+        assert "about others" not in verdict(other) + badge("ok", True, other)["text"], "that is worse, of whatever"
 
 
 @pytest.mark.parametrize(
@@ -365,6 +372,7 @@ def test_cases_that_are_worse_than_a_guess_are_named() -> None:
     worse = row | {"case": "b", "skill_strongest": -0.6}
     assert worse_sentence([row, worse]) == "1 of 2 cases is worse than a guess: b."
     assert worse_sentence([row, worse, worse | {"case": "c"}]) == "2 of 3 cases are worse than a guess: b, c."
+    assert one_case([row, worse]) == "a case is worse than a guess"
     assert worse_sentence([row, worse | {"skill_strongest": -0.05}]) == "", "that is no better, and not worse"
     assert worse_sentence([row, worse | {"role": "calibration"}]) == ""
     assert worse_sentence([worse]) == "", "all else on the page speaks of this case"
@@ -379,6 +387,7 @@ def test_a_case_that_lies_far_off_is_named(rms_mm: float, said: str) -> None:
         rows = rows[1:]  # of two nobody knows which is the odd one
     assert worse_sentence(rows).startswith(said)
     assert bool(worse_sentence(rows)) is bool(said)
+    assert one_case(rows) == ("a case lies far off" if said else ""), "the badge called it worse than a guess"
 
 
 def test_a_wide_interval_is_said_to_be_the_doing_of_few_insertions() -> None:
