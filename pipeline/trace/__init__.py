@@ -11,7 +11,7 @@ from pipeline.model import Curve, Lumen, Volume
 from pipeline.ranges import Profile
 from pipeline.status import FrameStatus
 from pipeline.trace.attempt import EntryPose
-from pipeline.trace.coarse import coarse_lumen, coarse_scan, times
+from pipeline.trace.coarse import ALL_OF_THEM, coarse_lumen, coarse_scan, times
 from pipeline.trace.config import TraceConfig
 from pipeline.trace.doubts import FAINT_BEYOND
 from pipeline.trace.elsewhere import hint_of_lines
@@ -79,9 +79,9 @@ def trace(
     curve = _seen((frame, reference, lumen), stated, previous, config)
     voxel = float(np.min(frame.spacing_mm))
     larger, ok = times(frame), curve.status is FrameStatus.OK
-    if larger > 1 and (not ok or curve.levels.get("blur_mm", 0.0) > THICK_VOXELS * voxel):
+    if larger != ALL_OF_THEM and (not ok or curve.levels.get("blur_mm", 0.0) > THICK_VOXELS * voxel):
         seen, empty = coarse_scan(frame, larger), reference and coarse_scan(reference, larger)
-        again = _seen((seen, empty, coarse_lumen(lumen, larger * voxel)), stated, previous, config)
+        again = _seen((seen, empty, coarse_lumen(lumen, seen)), stated, previous, config)
         if again.status is FrameStatus.OK and not (ok and _same(again, curve, voxel, 1.0)):
             curve = again
     if len(curve.points_mm) == 0:
