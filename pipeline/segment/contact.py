@@ -2,8 +2,8 @@
 
 The core of a vessel is where the depth (distance to the wall) is at least 0.7 of the local thickness. Where two vessels
 touch flank to flank, the opening between them is shallow and their cores stay apart; at a branching the cores join, or
-one of them ends there. Vessels have merged where they meet though they are far apart along the cores, and go on there
-in both directions.
+one of them ends there, within the other's radius. Vessels have merged where they meet though they are far apart along
+the cores, and go on there in both directions.
 """
 
 from collections.abc import Sequence
@@ -31,6 +31,8 @@ ONWARD = 1.0
 """How far (local radii) both vessels must go on beyond the contact, both ways: a branch ends there, and does not."""
 WINDOW = 2.5
 """Half width, in local radii, of the box around the contact in which that is looked for."""
+ADJACENT = 1.8
+"""Faces of one opening are linked across corners, sqrt(3) voxels."""
 LEAST_FACES = 4
 """Voxel faces shared by two vessels below which they do not count as touching."""
 MOST_FACES = 2000
@@ -70,8 +72,9 @@ def warning(places: tuple[Contact, ...]) -> tuple[str, ...]:
         return ()
     return (
         f"segment: vessels that run side by side are open to each other in {how_many(places)}, allowed 0; largest "
-        f"at {named(places)}; a simulated wire may slip across there: look at the picture, scan with smaller voxels,"
-        " or give the lumen as a file (manifest key lumen)",
+        f"at {named(places)}; a simulated wire may slip across there: look at the picture (where a branch leaves at 20 "
+        "degrees or less it may be its crotch), scan with smaller voxels, or give the lumen as a file (manifest key "
+        "lumen)",
     )
 
 
@@ -129,22 +132,50 @@ def contacts(distance: Grid, least_area: float = 0.0) -> tuple[Contact, ...]:
         return ()
     every = -(-len(found) // MOST_FACES)
     found = found[::every]
-    passes = {}
-    for core_voxel in np.unique(found[:, 1:]):
-        radius = thick[core_voxel] / voxel
-        window, least = int(np.ceil(WINDOW * radius)), int(np.ceil(ONWARD * radius))
-        passes[core_voxel] = runs_on(voxels, cores, int(core_voxel), window, least)
-    found = found[[passes[p] and passes[q] for _, p, q in found]]
+    at = unflattened(inner, values.shape)
+    found = found[_go_on(found, voxels, cores, thick / voxel) & ~_in_crotch(found, at, spacing, cores, thick)]
     if len(found) == 0:
         return ()
     # a face stands for as many as were passed over, of an area each
     face = every * float(np.prod(spacing) ** (2 / 3))
-    openings = _openings(unflattened(inner[found[:, 0]], values.shape), thick[found[:, 1]], voxel)
+    openings = _openings(at[found[:, 0]], thick[found[:, 1]], voxel)
     return tuple(
-        Contact(distance.to_mm(at.mean(axis=0)), len(at) * face)
-        for at, radius in openings
-        if every * len(at) >= LEAST_FACES and len(at) * face >= least_area * radius**2
+        Contact(distance.to_mm(own.mean(axis=0)), len(own) * face)
+        for own, radius in openings
+        if every * len(own) >= LEAST_FACES and len(own) * face >= least_area * radius**2
     )
+
+
+def _go_on(found: Index, voxels: Inner, cores: Cores, radius: Array) -> NDArray[np.bool_]:
+    """Whether both vessels go on both ways from each of the ``meetings`` found (m, 3); radius : (n,) in voxels."""
+    passes = {}
+    for voxel in np.unique(found[:, 1:]):
+        window, least = (int(np.ceil(far * radius[voxel])) for far in (WINDOW, ONWARD))
+        passes[voxel] = runs_on(voxels, cores, int(voxel), window, least)
+    return np.array([passes[p] and passes[q] for _, p, q in found], bool)
+
+
+def _in_crotch(found: Index, at: Index, spacing: Array, cores: Cores, thick: Array) -> NDArray[np.bool_]:
+    """Whether ``meetings`` found (m, 3) belong to an opening at which one vessel branches from the other.
+
+    At less than 45 degrees it is so long that at its far end both go on both ways. at : (n, 3) places in voxels.
+    """
+    part, steps = cores
+    last = np.zeros(part.max() + 1, steps.dtype)
+    np.maximum.at(last, part[part >= 0], steps[part >= 0])
+    ends = np.flatnonzero((part >= 0) & ((steps == 0) | (steps == last[part])))
+    out, opening = np.zeros(len(found), bool), parts(at[found[:, 0]].astype(float), ADJACENT)
+    for n in range(opening.max() + 1):
+        own = opening == n
+        both_ways = np.concatenate([found[own, 1:], found[own, :0:-1]])
+        for one in np.unique(part[both_ways[:, 0]]):
+            sides = both_ways[part[both_ways[:, 0]] == one]
+            far = ONWARD * float(thick[sides[:, 0]].max() / spacing.min())
+            near = [e for e in ends[part[ends] == one] if np.min(np.abs(steps[sides[:, 0]] - steps[e])) <= far]
+            if len(set(steps[near])) == 1:  # with both ends in it, it is the opening's own core
+                away = np.linalg.norm((at[near][:, None] - at[sides[:, 1]]) * spacing, axis=2)
+                out[own] |= bool(np.any(away <= thick[sides[:, 1]] + spacing.min()))
+    return out
 
 
 def _openings(places: Index, radius: Array, voxel: float) -> list[tuple[Index, float]]:

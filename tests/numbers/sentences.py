@@ -175,7 +175,7 @@ def lengths() -> Numbers:
     return together(
         in_step=("".join(f"{f.status} {f.message} " for f in depths.in_step(frames, 0.3)) for frames in found),
         elsewhere=(
-            " ".join(depths.stated_elsewhere(frames, depths.traced_depths(frames, ORIGIN, [0.0, 0.6, 0.8]), 2.0))
+            " ".join(depths.stated_elsewhere(frames, depths.traced_depths(frames, ORIGIN, [0.0, 0.6, 0.8]), 0.17, None))
             for frames in found
         ),
         shrinking=(" ".join(depths.shrinking(frames, 0.3)) for frames in found),

@@ -38,6 +38,8 @@ from solver.grid import Grid
 from tests.pipeline.doubts import dim, frames, with_gap
 
 DEPTHS = [10.0, 14.0, 18.0, 22.0, 26.0, 30.0]
+COMMON_MM = 0.17
+"""Half a voxel of 0.3 mm that an entry is known to, and a quarter that traced tips are."""
 
 
 def from_entry(seen: list[Frame], z_mm: float = 0.0) -> dict[int, float]:
@@ -47,7 +49,7 @@ def from_entry(seen: list[Frame], z_mm: float = 0.0) -> dict[int, float]:
 
 def elsewhere(lengths: list[float], expected: list[float], z_mm: float = 0.0) -> list[str]:
     seen = frames(lengths, expected)
-    return stated_elsewhere(seen, from_entry(seen, z_mm), 2.0)
+    return stated_elsewhere(seen, from_entry(seen, z_mm), COMMON_MM, None)
 
 
 @pytest.mark.parametrize("cut", [0, 3, 5])
@@ -69,11 +71,38 @@ def test_a_scale_that_is_off_or_read_by_hand_is_no_fault() -> None:
 def test_depths_counted_from_elsewhere_are_a_warning() -> None:
     """1.5 mm in every frame, within the tolerance of each: 16 of 18 ok, and nothing was said."""
     (said,) = elsewhere([d - 1.5 for d in DEPTHS], DEPTHS)
-    assert said.startswith("the traced wires are 1.5 mm shorter than insertion_mm states (median of 6 frames)")
+    assert said.startswith("the traced wires are 1.5 mm shorter than insertion_mm states (median of 6 frames; ")
     assert Caveats(warnings=[said]).against, "pages name it first"
     assert elsewhere([d - 0.4 for d in DEPTHS], DEPTHS) == []
-    assert elsewhere([d - 1.5 for d in DEPTHS[:3]], DEPTHS[:3]) == []
+    assert elsewhere([d - 1.5 for d in DEPTHS[:2]], DEPTHS[:2]) == []
     assert elsewhere(DEPTHS, [float("nan")] * 6) == []
+
+
+def test_a_wrong_zero_of_the_ruler_is_told_of_three_frames() -> None:
+    """Of stated depths that were 1.5 mm too deep alike, and of 0.8 mm in six frames, nothing was said."""
+    read = np.array([-0.02, 0.0, 0.03])
+    (said,) = elsewhere([*(DEPTHS[:3] + read - 1.5)], DEPTHS[:3])
+    assert "1.5 mm shorter than insertion_mm states (median of 3 frames" in said
+    assert said.endswith("unless simulate.depth is manifest: then they end as much too deep")
+    assert elsewhere([d + 0.8 for d in DEPTHS], DEPTHS)[0].endswith("too shallow")
+    assert not elsewhere([*(DEPTHS[:3] + 20.0 * read - 1.2)], DEPTHS[:3]), "read to 0.5 mm, three are so by chance"
+
+
+def test_a_zero_is_as_well_known_as_the_entry_and_the_ruler_are() -> None:
+    seen = frames([d - 0.9 for d in DEPTHS], DEPTHS)
+    for common_mm, read_mm, told in ((0.17, None, 1), (0.17, 0.1, 1), (0.3, None, 0), (0.17, 1.0, 0)):
+        assert len(stated_elsewhere(seen, from_entry(seen), common_mm, read_mm)) == told
+
+
+def test_right_depths_are_hardly_ever_told() -> None:
+    """Each read to 0.5 mm, of an entry that is off within its standard deviation."""
+    rng = np.random.default_rng(0)
+    lengths = [
+        n * [0.0] + d + rng.normal(scale=COMMON_MM) + rng.normal(scale=0.5, size=n)
+        for n in (3, 6)
+        for d in [np.array(DEPTHS[:n])] * 500
+    ]
+    assert sum(len(elsewhere([*each], DEPTHS[: len(each)])) for each in lengths) <= 2
 
 
 def test_a_scale_that_is_off_is_told_where_depths_were_read_well() -> None:
@@ -109,8 +138,8 @@ def test_depths_that_are_refused_count_among_those_counted_from_elsewhere() -> N
     """2 mm in each of five frames: two were refused, alone, and three were too few to be told of."""
     seen = frames([d - 1.9 for d in DEPTHS[:5]], DEPTHS[:5])
     seen = [f.failed("trace", FrameStatus.LENGTH_MISMATCH, "by itself") if f.index < 2 else f for f in seen]
-    (said,) = stated_elsewhere(seen, from_entry(seen), 2.0)
-    assert said.startswith("the traced wires are 1.9 mm shorter than insertion_mm states (median of 5 frames)")
+    (said,) = stated_elsewhere(seen, from_entry(seen), COMMON_MM, None)
+    assert said.startswith("the traced wires are 1.9 mm shorter than insertion_mm states (median of 5 frames; ")
 
 
 def test_an_entry_before_the_wire_begins_counts_as_depth() -> None:

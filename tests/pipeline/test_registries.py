@@ -100,6 +100,8 @@ def test_a_cell_of_a_notebook_may_be_run_again(as_before: None, told: str) -> No
 def test_every_metric_is_defined_in_one_place() -> None:
     """Name, unit, formula and pooling stand in columns.toml; the page is made of them."""
     assert not [name for name in metrics.METRICS if not ERRORS[name].formula]
+    columns = [ERRORS[f"null_{name}_rms_mm"] for name in nulls.NULLS]
+    assert not [column.name for column in columns if not (column.formula or column.module)]
     assert metrics_page.PAGE.read_text(encoding="utf-8") == metrics_page.text(), "python -m tests.studies.metrics_page"
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy import ndimage
+from scipy.spatial import cKDTree
 
 from data_synthetic.anatomy import shapes
 from pipeline.model import Volume
@@ -85,6 +86,27 @@ def test_a_membrane_thinner_than_a_voxel_is_seen_by_its_darker_sheet(membrane_mm
 )
 def test_junctions_narrowings_and_sacs_are_no_contacts(anatomy, low, high):
     assert segment(scanned(anatomy, low, high, 0.4), [[0.0, 0.0, 1.0]]).warnings == ()
+
+
+def forked(degrees, window, branch_mm=1.2, voxel=0.4):
+    """A trunk of radius 1.8 mm and a branch at an angle, which with a ``window`` comes back to it and leaves again."""
+    z = np.linspace(0.0, 30.0, 301)
+    x = np.tan(np.radians(degrees)) * (z - 4.0)
+    if window:
+        x = np.minimum(x, 2.6 + 0.03 * (z - 18.0) ** 2)
+    branch = np.column_stack([x, 0.0 * x, z])[z >= 4.0]
+    index = np.stack(np.indices((52, 16, 75)), axis=-1) * voxel - [3.2, 3.1, -0.1]
+    trunk = np.hypot(index[..., 0], index[..., 1]) - 1.8
+    values = np.minimum(trunk, cKDTree(branch).query(index)[0] - branch_mm)
+    return Grid(values.astype(np.float32), [voxel] * 3, [-3.2, -3.1, 0.1])
+
+
+@pytest.mark.parametrize(("degrees", "branch_mm"), [(25.0, 1.2), (30.0, 1.2), (30.0, 0.9), (35.0, 1.0)])
+def test_the_crotch_of_a_sharp_fork_is_no_contact_and_a_window_further_on_is(degrees, branch_mm):
+    """At 30 degrees it was told as vessels open to each other: at its far end both go on both ways."""
+    assert contact.contacts(forked(degrees, window=False, branch_mm=branch_mm)) == ()
+    (window,) = contact.contacts(forked(degrees, window=True, branch_mm=branch_mm))
+    assert abs(window.place_mm[2] - 18.0) < 2.0
 
 
 def test_a_vessel_thinner_than_its_blur_alone_is_refused_by_name():

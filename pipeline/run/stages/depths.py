@@ -9,9 +9,10 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.special import bdtrc, ndtr, stdtrit
+from scipy.special import bdtrc, ndtr, ndtri, stdtrit
 
 from pipeline.arrays.grids import spread
+from pipeline.budget.inputs import INSERTION_MM
 from pipeline.model import Array, Clamp, Doubt
 from pipeline.run.stages.known import Frame
 from pipeline.simulate.clamp import TIP_VOXELS, depth_from
@@ -21,8 +22,8 @@ from reports.case_files import frames_named
 
 AROUND = 5
 """Number of neighbouring frames whose median difference of traced length and stated depth is the usual one."""
-FEWEST = 4
-"""Fewest frames for a check."""
+FEWEST, FEWEST_ALIKE = 4, 3
+"""Fewest frames for a check, and for that of what all are off by alike."""
 ALIKE = 0.8
 """Share of the frames that are off to one side, from which depths are counted from elsewhere."""
 SURE = 5.0
@@ -37,6 +38,8 @@ SURELY = 6.0
 """Standard deviations from which a single such step is told: two frames of thirty that are exchanged are 9 apart."""
 LEAST_SCALE, CHANCE = 0.01, 1e-3
 """By how much a scale must be off to be told, and how often right depths may seem as wrong."""
+LEAST_MM, OF_MEDIAN = 0.5, 1.25
+"""By how much the zero of depths must be off to be told, and a median's standard deviation over a mean's."""
 
 
 def in_step(frames: Sequence[Frame], voxel_mm: float) -> list[Frame]:
@@ -93,24 +96,43 @@ def to_depth(frames: Sequence[Frame], depths_mm: Mapping[int, float], tolerance_
     return out
 
 
-def stated_elsewhere(frames: Sequence[Frame], depths_mm: Mapping[int, float], tolerance_mm: float) -> list[str]:
+def stated_elsewhere(
+    frames: Sequence[Frame], depths_mm: Mapping[int, float], common_mm: float, read_mm: float | None
+) -> list[str]:
     """A warning where all wires are about as much shallower, or deeper, than insertion_mm states.
 
-    depths_mm : of ``traced_depths``.     tolerance_mm : by how much a frame alone may be.
+    depths_mm : of ``traced_depths``.     common_mm : standard deviation of what all depths share: the entry, and the
+    traced tips.     read_mm : of each stated depth by itself; None where the manifest does not state it.
     """
-    stated = {f.index: f.expected_mm for f in frames}
-    lengths = {f.index: f.curve.length_mm for f in frames if f.curve is not None}
-    known = np.array([mm - stated[n] for n, mm in depths_mm.items()])
-    usual = in_common(known, 0.5 * tolerance_mm) if len(known) >= FEWEST else 0.0
+    seen = [f for f in frames if f.index in depths_mm]
+    if len(seen) < FEWEST_ALIKE:
+        return []
+    known = np.array([depths_mm[f.index] - f.expected_mm for f in seen])
+    tips = np.nan_to_num([0.0 if f.curve is None else f.curve.tip_sigma_mm for f in seen])
+    limit = float(np.hypot(-ndtri(0.5 * CHANCE) * common_mm, _median_within(known, tips, read_mm)))
+    usual = in_common(known, max(LEAST_MM, limit))
     if not usual:
         return []
-    late = float(np.median([mm - lengths[n] for n, mm in depths_mm.items()]))
-    begins = f" and begin {late:.1f} mm beyond entry_mm" if late > 0.5 * tolerance_mm else ""
+    late = float(np.median([depths_mm[f.index] - f.curve.length_mm for f in seen if f.curve is not None]))
+    begins = f" and begin {late:.1f} mm beyond entry_mm" if late > LEAST_MM else ""
     return [
         f"the traced wires are {abs(usual):.1f} mm {'longer' if usual > 0 else 'shorter'} than insertion_mm states"
-        f"{begins} (median of {len(known)} frames): check from where depths were counted, and entry_mm; the simulated "
-        "wires go as deep as the traced ones, unless simulate.depth is manifest"
+        f"{begins} (median of {len(seen)} frames; chance explains {limit:.1f} mm): check from where depths were "
+        "counted, and entry_mm; the simulated wires go as deep as the traced ones, unless simulate.depth is manifest: "
+        f"then they end as much too {'shallow' if usual > 0 else 'deep'}"
     ]
+
+
+def _median_within(apart: Array, tips_mm: Array, read_mm: float | None) -> float:
+    """By how much the median of differences (n,) is off 0 by chance, once in 1 / CHANCE: by what each is known to.
+
+    Where nobody states how well depths were read, that they differ alike shows it, too.
+    """
+    stated = INSERTION_MM if read_mm is None else read_mm
+    off = float(-ndtri(0.5 * CHANCE) * np.hypot(stated, np.median(tips_mm)))
+    if read_mm is None:
+        off = min(off, float(stdtrit(len(apart) - 1, 1.0 - 0.5 * CHANCE) * np.std(apart, ddof=1)))
+    return OF_MEDIAN * off / float(np.sqrt(len(apart)))
 
 
 def on_another_scale(frames: Sequence[Frame], depths_mm: Mapping[int, float]) -> list[str]:

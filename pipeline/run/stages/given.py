@@ -11,6 +11,7 @@ from pipeline.run.stages.known import Context, Frame, Known
 from pipeline.run.stages.way import passed_at
 from pipeline.simulate import wall_of
 from pipeline.simulate.clamp import Prior, TracedFrame
+from pipeline.study.manifest import Case
 
 ENTRY_SIGMA_VOXELS = 0.5
 """Standard deviation, voxels, of an entry point picked in a scan, where the manifest states none."""
@@ -28,6 +29,11 @@ def seen_in(frames: Sequence[Frame]) -> list[TracedFrame]:
     ]
 
 
+def entry_sigma_mm(case: Case, voxel_mm: float) -> float:
+    """How well the manifest knows the entry, one standard deviation along each axis."""
+    return ENTRY_SIGMA_VOXELS * voxel_mm if case.entry_sigma_mm is None else case.entry_sigma_mm
+
+
 def manifest_clamp(run: Context, known: Known) -> tuple[Clamp, Prior, float]:
     """The clamp as the manifest has it, how well it knows it, and the voxels' size, mm.
 
@@ -41,8 +47,7 @@ def manifest_clamp(run: Context, known: Known) -> tuple[Clamp, Prior, float]:
     axis = least if case.material_axis is None else np.array(case.material_axis)
     down = None if case.down is None else np.array(case.down)
     given = Clamp(np.array(case.entry_mm), direction, axis, down)
-    sigma = ENTRY_SIGMA_VOXELS * voxel if case.entry_sigma_mm is None else case.entry_sigma_mm
-    return given, Prior(sigma, case.entry_direction_sigma_deg), voxel
+    return given, Prior(entry_sigma_mm(case, voxel), case.entry_direction_sigma_deg), voxel
 
 
 def trial_of(

@@ -30,6 +30,9 @@ CHORD_MM, LONGER = 2.0, 0.02
 points that scatter by a tenth of their distance by 0.01."""
 CORNER_VOXELS = 0.25
 """How far beside a smooth curve the lines between points may pass: traces of scans are off by 0.03 to 0.11 voxel."""
+FEWEST_TURNS, AGAINST = 8, -0.25
+"""Turns from which a curve can be told to be jagged, and the correlation of neighbouring ones below which it is: -2/3
+where points scatter, and above 0 along a bend."""
 LONE, UNSEEN_RADIUS_MM = 0.9, 20.0
 """Share of a curve's length from which a piece is all of it and nothing tells how it bends, and a bend it may have."""
 LEAST_BEND_MM = 0.01
@@ -102,16 +105,25 @@ def _in_lumen(curve: Curve, distance: Grid, stiffness_N_mm2: float) -> Curve:
 
 
 def rough(curves: Mapping[int, Array], voxel_mm: float, whose: str, mend: str) -> list[str]:
-    """A warning of curves (n, 3), by frame, that cut the wire's corners. whose, mend : words for it."""
+    """Warnings of curves (n, 3), by frame, that cut the wire's corners, or are jagged. whose, mend : words for it."""
     told = {frame: _cut(points, CORNER_VOXELS * voxel_mm) for frame, points in curves.items()}
-    coarse = [f"frame {n}: {text}" for n, text in told.items() if text]
-    if not coarse:
-        return []
-    mostly = f" ({MOSTLY_LINES})" * (2 * sum(_LINE in text for text in told.values()) > len(told))
-    return [
-        f"{whose} have few points{mostly}: straight lines between them pass beside a smooth wire "
-        f"({listed(coarse, MOST_NAMED)}; they may pass {CORNER_VOXELS * voxel_mm:.2f} mm beside it): {mend}"
-    ]
+    cut = {frame: text for frame, text in told.items() if text}
+    longer = {n: share for n in cut if (share := jagged(curves[n]))}
+    coarse = [f"frame {n}: {text}" for n, text in cut.items() if n not in longer]
+    said = []
+    if coarse:
+        mostly = f" ({MOSTLY_LINES})" * (2 * sum(_LINE in text for text in told.values()) > len(told))
+        said.append(
+            f"{whose} have few points{mostly}: straight lines between them pass beside a smooth wire "
+            f"({listed(coarse, MOST_NAMED)}; they may pass {CORNER_VOXELS * voxel_mm:.2f} mm beside it): {mend}"
+        )
+    if longer:
+        each = listed([f"frame {n}: {100.0 * share:.1f} %" for n, share in longer.items()], MOST_NAMED)
+        said.append(
+            f"{whose} are jagged: their points scatter to both sides of a smooth wire, which makes them longer "
+            f"({each}, about): arc lengths and depth offsets are off by as much: smooth them"
+        )
+    return said
 
 
 def _cut(points_mm: Array, allowed_mm: float) -> str:
@@ -127,6 +139,22 @@ def _cut(points_mm: Array, allowed_mm: float) -> str:
         return f"{length:.1f} {_LINE}" if longest**2 / (8.0 * UNSEEN_RADIUS_MM) > allowed_mm else ""
     mm = corner_mm(points_mm)
     return f"{mm:.2f} mm beside it" if mm > allowed_mm else ""
+
+
+def jagged(points_mm: Array) -> float:
+    """The share by which a curve (n, 3) whose points scatter is longer than a smooth one; 0 for one that is smooth.
+
+    Scatter s (of both components across) at steps h turns next tangents against each other: products of the turns at
+    a point and the next are -4 s^2 / h^2 in the mean, at the next but one s^2 / h^2, and a bend adds the same to both.
+    """
+    steps = np.diff(points_mm, axis=0)
+    turn = np.diff(steps / np.maximum(np.linalg.norm(steps, axis=1), 1e-12)[:, None], axis=0)
+    if len(turn) < FEWEST_TURNS:
+        return 0.0
+    square, next_one, next_but_one = (
+        float(np.mean(np.sum(turn[n:] * turn[: len(turn) - n], axis=1))) for n in range(3)
+    )
+    return (next_but_one - next_one) / 5.0 if next_one < AGAINST * square else 0.0
 
 
 def zigzag(points_mm: Array) -> float:

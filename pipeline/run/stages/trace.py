@@ -35,6 +35,7 @@ from pipeline.run.stages.depths import (
 )
 from pipeline.run.stages.dim_ends import barely_seen, faint_ends, own_dim_ends
 from pipeline.run.stages.gaps import own_gaps
+from pipeline.run.stages.given import entry_sigma_mm
 from pipeline.run.stages.known import Context, Frame, Known, trusted
 from pipeline.run.stages.own_curves import RESAMPLE, as_given, given_curves, rough
 from pipeline.run.stages.repeated import alike, once, rescanned
@@ -43,6 +44,7 @@ from pipeline.run.stages.wire_free import wire_in_reference
 from pipeline.run.straightened import straightened
 from pipeline.segment.opened import opened
 from pipeline.simulate import wall_of
+from pipeline.simulate.clamp import TIP_VOXELS
 from pipeline.status import FrameStatus, StageError
 from pipeline.trace import DIM_FROM_TIP, of_catheter, trace
 from pipeline.trace.config import TraceConfig
@@ -97,7 +99,8 @@ def _in_step(run: Context, frames: list[Frame], voxel_mm: float) -> list[Frame]:
     swapped = in_another_order(frames, depths_mm, tolerance_mm)
     run.log.warnings += swapped
     frames = frames if swapped else perhaps_turned(frames)
-    run.log.warnings += stated_elsewhere(frames, depths_mm, tolerance_mm)
+    common_mm = float(np.hypot(entry_sigma_mm(run.case, voxel_mm), TIP_VOXELS * voxel_mm))
+    run.log.warnings += stated_elsewhere(frames, depths_mm, common_mm, run.case.insertion_sigma_mm)
     run.log.warnings += [] if swapped else on_another_scale(frames, depths_mm)
     frames = in_step(to_depth(frames, depths_mm, tolerance_mm), voxel_mm)
     run.log.warnings += [*shrinking(frames, voxel_mm), *standing(frames, voxel_mm)]
