@@ -64,10 +64,7 @@ def render_simulators(out_dir: Path, embed: bool = False) -> Path:
         "nearer": nearer(files.simulators.to_dict("records"), off=_off(table, copied)),
         "first": next(iter(places)),
         "said": told,
-        "rivals": {
-            _content.predictor_label(rival): meaning_of_rival(rival)
-            for rival in dict.fromkeys(one["rival"] for one in told if one["rival"])
-        },
+        "rivals": _rivals(told),
         "ours": OURS if OURS in folders else "",
         "shared": _shared(folders.get(OURS), links.get(OURS, "")),
         "interval": next(iter(table["interval"].dropna()), ""),
@@ -78,6 +75,12 @@ def render_simulators(out_dir: Path, embed: bool = False) -> Path:
         "off": _never_nearest(files.where),
     }
     return write_page("simulators.html.j2", page, out_dir / PAGE)
+
+
+def _rivals(told: Sequence[Mapping[str, Any]]) -> dict[str, str]:
+    """What is meant by each predictor that a verdict names."""
+    named = dict.fromkeys(one["rival"] for one in told if one["rival"])
+    return {_content.predictor_label(rival): meaning_of_rival(rival) for rival in named}
 
 
 def folders_in(out_dir: Path) -> dict[str, Path]:
@@ -114,7 +117,6 @@ def _said(
     said = said or mixed or not_reached(folder) or "No frame of it has a result." * (not good)
     beside = "" if caveats.copied else _without_others(*alone_skill, row)
     more += filter(None, [beside, f"Of the study {missing}." * bool(missing)])
-    rest = len(lines) - _MOST_WARNINGS
     return {
         "badge": badge(status, status == "ok", row, caveats._replace(warnings=on_its_page)),
         "verdict": said,
@@ -122,11 +124,14 @@ def _said(
         "rival": str(rival) if pd.notna(rival) else "",
         "closed": closed,
         "failures": _failed(folder, alone["simulator"]) if failed else [],
-        "warnings": [
-            *lines[:_MOST_WARNINGS],
-            *[f"{counted(rest, 'more warning')} on the pages of its cases"] * (rest > 0),
-        ],
+        "warnings": _first_of(lines),
     }
+
+
+def _first_of(warnings: Sequence[str]) -> list[str]:
+    """The first few, and how many more there are."""
+    rest = len(warnings) - _MOST_WARNINGS
+    return [*warnings[:_MOST_WARNINGS], *[f"{counted(rest, 'more warning')} on the pages of its cases"] * (rest > 0)]
 
 
 def _shared(ours: Path | None, link: str) -> dict[str, str]:
