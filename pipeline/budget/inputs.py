@@ -114,8 +114,8 @@ def sigmas_of(
         said[source] = f"{values[source]:.3g}{UNITS.get(name, ' (relative)')}, {told}"
     clamp = nominal.clamp
     known = clamp.covariance is not None
-    told = f"{clamp.sigma_mm:.3f} mm across and {clamp.sigma_deg:.2f} degrees{IF_AS_MODELLED * bool(clamp.note)}"
-    said["clamp"] = told if known else "exact"
+    condition = f" ({IF_AS_MODELLED})" * bool(clamp.note)
+    said["clamp"] = f"{clamp.sigma_mm:.3f} mm across and {clamp.sigma_deg:.2f} degrees{condition}" if known else "exact"
     kinds = (("traced", depth_mm[nominal.traced]), ("manifest", depth_mm[~nominal.traced]))
     said["depth"] = " and ".join(f"{float(np.median(some)):.2f} mm, {kind}" for kind, some in kinds if len(some))
     if (common := found.get("insertion_mm", 0.0)) and not nominal.traced.all():

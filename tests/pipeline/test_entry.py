@@ -312,7 +312,7 @@ def test_a_clamp_is_known_under_a_condition_that_a_good_fit_does_not_show() -> N
     found = estimate(curves, off(0.0, (0.0, 0.0, 0.0)))
     assert error_deg(found) > 2.0 * found.sigma_deg
     assert not found.warning
-    assert f"degrees{IF_AS_MODELLED}" in found.note
+    assert f"degrees {IF_AS_MODELLED}, which a good fit does not show" in found.note
 
 
 def test_rough_traces_are_told_as_such_and_kept() -> None:
