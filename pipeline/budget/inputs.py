@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.model import Array, Clamp, Wire
+from pipeline.simulate.clamp_told import IF_AS_MODELLED
 from pipeline.simulate.config import SimulateConfig
 
 LUMEN_VOXELS, LUMEN_NOISE_VOXELS, LUMEN_BIAS_VOXELS = 0.07, 0.1, 0.05
@@ -113,7 +114,8 @@ def sigmas_of(
         said[source] = f"{values[source]:.3g}{UNITS.get(name, ' (relative)')}, {told}"
     clamp = nominal.clamp
     known = clamp.covariance is not None
-    said["clamp"] = f"{clamp.sigma_mm:.3f} mm across and {clamp.sigma_deg:.2f} degrees" if known else "exact"
+    condition = f" ({IF_AS_MODELLED})" * bool(clamp.note)
+    said["clamp"] = f"{clamp.sigma_mm:.3f} mm across and {clamp.sigma_deg:.2f} degrees{condition}" if known else "exact"
     kinds = (("traced", depth_mm[nominal.traced]), ("manifest", depth_mm[~nominal.traced]))
     said["depth"] = " and ".join(f"{float(np.median(some)):.2f} mm, {kind}" for kind, some in kinds if len(some))
     if (common := found.get("insertion_mm", 0.0)) and not nominal.traced.all():

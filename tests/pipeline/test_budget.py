@@ -35,6 +35,7 @@ from pipeline.cli import main
 from pipeline.model import Array, Clamp, Curve, Lumen, Wall, Wire
 from pipeline.run.stages.budget import Work, _lost, _row
 from pipeline.run.stages.known import Frame
+from pipeline.simulate.clamp_told import IF_AS_MODELLED
 from pipeline.simulate.config import SimulateConfig, SolverConfig
 from pipeline.simulate.evidence import TraceSamples
 from pipeline.simulate.way import Stop, Way
@@ -202,6 +203,8 @@ def test_a_fitted_roll_is_as_uncertain_as_its_fit_says() -> None:
 def test_what_is_not_stated_is_a_default_that_is_said() -> None:
     plain, told = sigmas(nominal()), sigmas(nominal(), roll_deg=0.0, friction=0.02)
     assert (plain.roll, plain.said["roll"]) == (ROLL_DEG, f"{ROLL_DEG:g} degrees, default")
+    estimated = nominal()._replace(clamp=replace(nominal().clamp, note="estimated"))
+    assert [IF_AS_MODELLED in sigmas(of).said["clamp"] for of in (nominal(), estimated)] == [False, True]
     assert (told.roll, told.said["roll"]) == (0.0, "0 degrees, stated")
     assert (plain.friction, told.friction) == (0.0, 0.02), "without friction none is drawn by default"
     assert sigmas(nominal(friction=0.1)).friction == pytest.approx(FRICTION * 0.1)
