@@ -65,8 +65,7 @@ def render_simulators(out_dir: Path, embed: bool = False) -> Path:
         "first": next(iter(places)),
         "said": told,
         "rivals": _rivals(told),
-        "ours": OURS if OURS in folders else "",
-        "shared": _shared(folders.get(OURS), links.get(OURS, "")),
+        **_ours(folders.get(OURS), links.get(OURS, "")),
         "interval": next(iter(table["interval"].dropna()), ""),
         "simulators": grid,
         "few": in_common(files.simulators),
@@ -128,18 +127,19 @@ def _said(
     }
 
 
-def _first_of(warnings: Sequence[str]) -> list[str]:
-    """The first few, and how many more there are."""
-    rest = len(warnings) - _MOST_WARNINGS
-    return [*warnings[:_MOST_WARNINGS], *[f"{counted(rest, 'more warning')} on the pages of its cases"] * (rest > 0)]
-
-
-def _shared(ours: Path | None, link: str) -> dict[str, str]:
-    """How many warnings stand on the page of our own wires, and where: below they are left out, as the same scans,
-    lumen and clamp give them to all.
+def _ours(folder: Path | None, link: str) -> dict[str, Any]:
+    """The name of our own wires where they are among the others, and how many warnings stand on their page, and where:
+    below they are left out, as the same scans, lumen and clamp give them to all.
     """
-    count = len(caveats_in(ours).warnings) if ours else 0
-    return {"count": counted(count, "warning"), "link": link} if count else {}
+    count = len(caveats_in(folder).warnings) if folder else 0
+    shared = {"count": counted(count, "warning"), "link": link} if count else {}
+    return {"ours": OURS * bool(folder), "shared": shared}
+
+
+def _first_of(lines: Sequence[str]) -> list[str]:
+    rest = len(lines) - _MOST_WARNINGS
+    more = f"{counted(rest, 'more warning')} on the pages of its cases"
+    return [*lines[:_MOST_WARNINGS], *[more] * (rest > 0)]
 
 
 def _without_others(skill: Any, frames: Any, beside: Mapping[str, Any]) -> str:

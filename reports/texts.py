@@ -7,6 +7,7 @@ each is refused by name, in a sentence that says what is allowed.
 import json
 import os
 import stat
+import sys
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
@@ -48,13 +49,23 @@ def status_of(path: Path) -> os.stat_result | None:
     except (FileNotFoundError, NotADirectoryError):
         return None
     except UnicodeError:
-        raise unreadable(ascii(str(path)), "the name is not UTF-8; allowed: names in UTF-8; rename the file") from None
+        raise unreadable(ascii(str(path)), _not_utf8(path)) from None
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else "the name holds a zero byte"
         name = str(path) if len(str(path)) < 300 else f"{str(path)[:120]}... ({len(str(path))} characters)"
         raise unreadable(
             name, f"cannot be opened ({reason}); allowed: a file that can be read; check the path"
         ) from None
+
+
+def _not_utf8(path: Path) -> str:
+    """Whose fault it is that a name is no text: its own, or that of a locale in which Python takes names for ASCII."""
+    try:
+        os.fsencode(path).decode()
+    except UnicodeError:
+        return "the name is not UTF-8; allowed: names in UTF-8; rename the file"
+    of_locale = f"the locale has names in {sys.getfilesystemencoding()}, and this one is in UTF-8; "
+    return f"{of_locale}allowed: a locale of UTF-8; set LC_ALL=C.UTF-8 or PYTHONUTF8=1"
 
 
 def size_of(path: Path, most: float = float("inf")) -> int:

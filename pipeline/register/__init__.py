@@ -175,7 +175,7 @@ def anchor(reference: Volume, lumen: Lumen) -> Anchor:
     patch_mm = max(LEAST_MM, -SPAN_RADII * float(distance.values.min()))
     wall = static_points(reference, _thinned(distance, band, POINTS), patch_mm)
     deep = distance.values[tuple(np.rint(distance.to_index(wall.points_mm)).astype(np.intp).T)]
-    brighter = 1.0 if wall.centred @ deep < 0.0 else -1.0
+    brighter = -1.0 if len(deep) and wall.centred @ deep > 0.0 else 1.0
     return Anchor(reference, wall, patch_mm, padding, brighter, shell_of(reference, distance))
 
 

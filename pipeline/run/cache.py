@@ -65,10 +65,11 @@ class Store:
             return _lumen[path]
         try:
             result = decoded(stage, key, _content(path))
-        except FileNotFoundError:
+        except (FileNotFoundError, NotADirectoryError):
             return None
         except OSError as error:
-            self.warn(f"the stored result {path} cannot be read ({error.strerror}): computed again")
+            if self._writable:  # else it is said already that the cache is of no use
+                self.warn(f"the stored result {path} cannot be read ({error.strerror}): computed again")
             return None
         except NOT_A_RESULT as error:
             self.warn(f"the stored result {path} is not as it was written ({error}): computed again")

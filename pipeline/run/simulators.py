@@ -168,7 +168,9 @@ def _where(folders: Mapping[str, Path], judged: Studies, common: Frames, off: Of
             found = {name: _pieces(parts, place, low, high) for name, parts in points.items()}
             if all(found[name] for name in compared):
                 here = {name: pieces for name, pieces in found.items() if pieces}
-                yield from _rows({"along": along, "low_mm": low, "high_mm": high}, here, off)
+                head = {"along": along, "low_mm": low, "high_mm": high}
+                for row in _rows(head, here, off):
+                    yield row | {"middle_mm": _middle(points[row["simulator"]], place, low, high)}
 
 
 Part = tuple[str, Array, Array, Array]
@@ -211,6 +213,13 @@ def _points(folder: Path, found: Sequence[Found], common: Frames) -> Iterator[tu
                 mine = arc[frames == number]
                 depth = np.full(len(mine), float(frame.row["insertion_mm"]))
                 yield (case.result.case, number), (frame.insertion, mine, depth, frame.error_mm)
+
+
+def _middle(parts: Sequence[Part], place: int, low: float, high: float) -> float:
+    """Where a bin's frames lie in it, each by its points' mean: depths of 25 and 35 mm are not at 22.5 and 32.5."""
+    found: list[Any] = [part[place] for part in parts]
+    inside = [at[(at >= low) & (at < high)] for at in found]
+    return float(np.mean([np.mean(at) for at in inside if len(at)]))
 
 
 def _pieces(parts: Sequence[Part], place: int, low: float, high: float) -> list[Piece]:

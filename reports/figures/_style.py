@@ -10,7 +10,9 @@ from reports.schema import ERRORS
 Look = dict[str, Any]  # what matplotlib is told of a line, a legend, cells
 PURPLE, BROWN, ROSE, SLATE = "#9A5B9F", "#8C6D1F", "#B8586B", "#5D6D8A"
 INK, GREY = "#222222", "#767676"
-PALETTE = (SIMULATED, PURPLE, BROWN, "#1F8A8A", ROSE, SLATE)  # no wire but ours, nor what failed, has one of these
+PALETTE = (SIMULATED, "#776600", "#AA77FF", "#22AA00", "#BB8877", "#007766")
+"""Of curves without a colour of their own: none is a wire's but ours, nor that of what failed. Any two are 28 apart
+(CIEDE2000), and 13 for who sees no red or no green; teal beside ours was 23, slate 12, and purple 4 without red."""
 UNCERTAINTY = "#1F8A8A"
 SPARE = ("#7A7A00", UNCERTAINTY)  # of columns without a style: no predictor has these colours
 SEQUENTIAL = ("#D8CBE3", "#5B0F7A")

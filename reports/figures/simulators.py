@@ -67,10 +67,11 @@ def who_is_nearest(files: SimulatorFiles) -> Drawing | None:
 
 
 def unbroken(rows: pd.DataFrame) -> tuple[list[float], list[float]]:
-    """Middles of bins and their errors, with a NaN between two that do not touch: no line crosses an empty one."""
-    low, high, error = (rows[name].to_numpy(float) for name in ("low_mm", "high_mm", "rms_mm"))
+    """Where errors are and these, with a NaN between two bins that do not touch: no line crosses an empty one."""
+    low, high, middle, error = (rows[name].to_numpy(float) for name in ("low_mm", "high_mm", "middle_mm", "rms_mm"))
+    middle = np.where(np.isnan(middle), 0.5 * (low + high), middle)  # of earlier results
     after = np.flatnonzero(low[1:] > high[:-1]) + 1
-    middles = np.insert(0.5 * (low + high), after, 0.5 * (high[after - 1] + low[after]))
+    middles = np.insert(middle, after, 0.5 * (high[after - 1] + low[after]))
     return middles.tolist(), np.insert(error, after, np.nan).tolist()
 
 

@@ -754,6 +754,18 @@ def test_a_user_without_a_home_is_told_what_to_set(
         main(["cache", "--info"])
 
 
+@pytest.mark.parametrize(
+    ("name", "told"),
+    [("Gr\udcc3\udcb6\udcc3\udc9fe", "set LC_ALL=C.UTF-8 or PYTHONUTF8=1"), ("\udcff", "rename the file")],
+)
+def test_a_name_that_the_locale_does_not_know_is_not_to_be_changed(
+    name: str, told: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """In the C locale a folder with umlauts, as Python has it there, was to be renamed."""
+    assert main(["check", name]) == 2
+    assert told in capsys.readouterr().err
+
+
 def test_a_terminal_that_knows_no_umlaut_gets_it_spelt_out() -> None:
     """A run that had computed everything ended in a traceback at its last line."""
     raw = io.BytesIO()

@@ -526,6 +526,7 @@ def test_a_store_that_cannot_be_written_costs_a_warning(
     assert run(study, tmp_path / "out") == 0
     said = capsys.readouterr().err
     assert said.count("the cache keeps nothing from here on") == 1
+    assert "cannot be read" not in said, "a line more for each result"
     assert "store cannot be written: Not a directory; make room or allow writing there" in said
     assert differences(whole, tmp_path / "out") == []
 

@@ -267,7 +267,8 @@ def test_who_is_nearest_where(compared: Path) -> None:
     assert (lead["lead"].drop(40.0) == "clear").all()
     assert lead.loc[0.0, "ratio_to_next"] == pytest.approx(0.5, rel=0.02)
     depth = where[where["along"] == "insertion depth"]
-    assert set(depth["low_mm"]) == set(DEPTHS)
+    assert set(depth["low_mm"]) == set(depth["middle_mm"]) == set(DEPTHS), "errors stood at 22.5 mm for depths of 20"
+    assert lead.loc[5.0, "middle_mm"] == pytest.approx(7.5, abs=0.5)
     assert list(depth.query("low_mm == 50")["frames"]) == [CASES - 2] * 3, "frames that count for all"
 
 

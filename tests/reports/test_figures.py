@@ -352,6 +352,7 @@ def test_lines_of_simulators_that_coincide_are_all_seen() -> None:
     """Of two the same one alone was seen where their gaps fell together, and marks hid each other."""
     rows = [
         {"along": along, "simulator": name, "low_mm": low, "high_mm": low + 5.0, "rms_mm": 0.1, "lead": None}
+        | {"middle_mm": low + 1.0}
         for along in ("distance from the earliest tip", "insertion depth")
         for name in ("a", "b", "c")
         for low in (0.0, 5.0)
@@ -586,8 +587,9 @@ def test_panels_that_share_an_axis_have_room_for_all_of_them() -> None:
 
 def test_no_line_crosses_a_bin_in_which_nothing_was_measured() -> None:
     bins = pd.DataFrame({"low_mm": [5.0, 10.0, 20.0], "high_mm": [10.0, 15.0, 25.0], "rms_mm": [0.1, 0.2, 0.3]})
+    bins["middle_mm"] = [9.0, np.nan, 24.9]  # in the file of an earlier version it is missing
     middles, errors = unbroken(bins)
-    assert middles == [7.5, 12.5, 17.5, 22.5]
+    assert middles == [9.0, 12.5, 17.5, 24.9]
     np.testing.assert_array_equal(errors, [0.1, 0.2, np.nan, 0.3])
 
 
