@@ -29,6 +29,8 @@ LEAST_CELLS = 3
 """Cells side by side: a branch of 3 voxels radius has 5 or 6, a bare wire on its way to the entry 2."""
 SURE = 6.0
 """Noises of the cells (by what they differ where nothing is) from which one is asked."""
+DARK = 0.5
+"""Darker cells per brighter one from which neither is medium: bone that moved by itself and streaks have both."""
 APART, BESIDE_METAL = 1.8, 2.0
 """Cell edges between the centres of two that touch, and within which metal's blur reaches."""
 
@@ -85,6 +87,8 @@ def branch_in(frame: Volume, shell: Shell, motion: Motion, gain: float, contrast
     more -= np.median(more[seen])
     high = seen & (np.abs(more) > max(AS_BRIGHT[0], SURE * MAD * float(np.median(np.abs(more[seen])))))
     metal, filled = high & (np.abs(more) > AS_BRIGHT[1]), high & (more > 0.0) & (more < AS_BRIGHT[1])
+    if np.count_nonzero(high & (more < 0.0)) > DARK * np.count_nonzero(filled):
+        return Branch()
     centres = shell.centre_mm[filled]
     if metal.any() and len(centres):
         centres = centres[cKDTree(shell.centre_mm[metal]).query(centres)[0] > BESIDE_METAL * shell.edge_mm]

@@ -123,7 +123,7 @@ def _wider(found: Sequence[tuple[int, Wider]]) -> list[str]:
     return [
         f"{frames_named([n for n, _ in found])}: the vessel's wall lies {abs(worst.voxels) * worst.voxel_mm:.2f} mm "
         f"{side} the reference's, all around (frame {number}): the reference shows another phantom, or this one at "
-        "another pressure or in another reconstruction; the lumen is the reference's, in which simulated wires have "
+        "another pressure, filled or reconstructed otherwise; the lumen is the reference's, where simulated wires have "
         "too much or too little room, and traces are less sure by half of that; scan the reference as the frames are"
     ]
 
@@ -136,7 +136,7 @@ def _branches(found: Sequence[tuple[int, Branch]]) -> list[str]:
     return [
         f"{frames_named([n for n, _ in found])}: something as bright as the filled vessel lies beside the lumen, at "
         f"LPS mm ({spelt(clearest.at_mm)}) (frame {number}), where the reference has nothing: a branch that it "
-        "does not show, or a sheath; simulated wires cannot go there, and real ones may: scan the reference as filled "
+        "does not show, a sheath, or a wire outside; simulated wires cannot go there: scan the reference as filled "
         "as the frames are"
     ]
 

@@ -138,10 +138,6 @@ def test_a_marker_band_does_not_draw_the_tip_to_itself(seed):
     assert abs(row.tip) < 3.0, "stated standard deviations; 4.6 and 6.9 where the band is taken for noise"
 
 
-def test_a_bright_way_in_noise_that_no_fit_follows_is_no_wire():
-    assert look("plain, no reference", 2839).verdict == "right", "one straight way of hundreds is"
-
-
 def test_without_its_reference_a_frame_is_not_believed_alone():
     """Once ok and 7.6 voxels wrong: in correlated noise the wall's model leaves lines of its own."""
     assert look("correlated noise, CNR 4 to 6", 305).verdict == "refused"
