@@ -24,9 +24,14 @@ MOSTLY_LINES = "most frames are one line"
 OF_THEIR_RUN = "in the run that made these wires: "
 """How a warning begins that a score has from the run whose wires it scores."""
 AGAINST_INPUTS = (
-    " from the traced one, as stated ", " insertion_mm states", " in entry_direction as stated", "the given lumen lies "
-)  # fmt: skip
-"""What warnings say that speak against an input: roll, tip's curve or catheter; depths; the clamp; a given lumen."""
+    " from the traced one, as stated ",
+    " insertion_mm states",
+    " in entry_direction as stated",
+    "the given lumen lies ",
+    " the reference's, all around",
+)
+"""What warnings say that speak against an input: roll, tip's curve or catheter; depths; the clamp; a given lumen; the
+reference's vessel, which is wider or narrower."""
 
 _OTHERS = 2
 

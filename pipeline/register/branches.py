@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from pipeline.arrays.grids import MAD, unflattened
@@ -19,14 +20,15 @@ from solver.grid import Grid
 SHELL_VOXELS = 2.5, 5.0
 """How far outside the wall the shell's voxels lie: beyond the blur of wall and wire, and of a wall that moved."""
 CELL_VOXELS = 3
-"""Edge of a cell."""
-FULL = 8
-"""Voxels of a cell at the least: their mean has a third of their noise."""
+"""Edge of a cell; along thick slices as many voxels as come nearest to it."""
+FULL = 0.3
+"""Share of a cell's voxels that the shell holds at the least: the mean of 8 has a third of their noise."""
 AS_BRIGHT = 0.5, 1.5
 """Shares of the vessel's contrast by which a cell is brighter than the reference where a vessel is filled; what has
 more is metal, as is what lies beside it."""
 LEAST_CELLS = 3
-"""Cells side by side: a branch of 3 voxels radius has 5 or 6, a bare wire on its way to the entry 2."""
+"""Cells side by side: a branch of 3 voxels radius has 5 or 6, a bare wire of 3 voxels on its way to the entry 2. One of
+6 voxels and more that is hardly brighter than the medium has as many as a branch, and is told too."""
 SURE = 6.0
 """Noises of the cells (by what they differ where nothing is) from which one is asked."""
 DARK = 0.5
@@ -63,15 +65,17 @@ class Shell:
 def shell_of(reference: Volume, distance: Grid) -> Shell:
     """The shell of a lumen (signed distance, mm) in its reference."""
     low, high = (v * distance.voxel_mm for v in SHELL_VOXELS)
+    high = min(high, float(distance.values.max()))  # beyond which distances are cut off
+    size = np.maximum(1, np.rint(CELL_VOXELS * distance.voxel_mm / distance.spacing_mm)).astype(np.intp)
     index = unflattened(np.flatnonzero((distance.values > low) & (distance.values < high)), distance.shape)
     points = distance.to_mm(index)
     grey, inside = _grey(reference, points)
     points, grey = points[inside], grey[inside]
-    _, cell, count = np.unique(index[inside] // CELL_VOXELS, axis=0, return_inverse=True, return_counts=True)
-    held = count[cell.ravel()] >= FULL
+    _, cell, count = np.unique(index[inside] // size, axis=0, return_inverse=True, return_counts=True)
+    held = count[cell.ravel()] >= FULL * np.prod(size)
     _, cell = np.unique(cell.ravel()[held], return_inverse=True)
     centres = np.stack([_means(cell, along) for along in points[held].T], axis=1)
-    return Shell(points[held], cell, centres, CELL_VOXELS * distance.voxel_mm, _means(cell, grey[held]))
+    return Shell(points[held], cell, centres, float(np.max(size * distance.spacing_mm)), _means(cell, grey[held]))
 
 
 def branch_in(frame: Volume, shell: Shell, motion: Motion, gain: float, contrast: float) -> Branch:
@@ -99,10 +103,14 @@ def branch_in(frame: Volume, shell: Shell, motion: Motion, gain: float, contrast
 
 
 def _grey(scan: Volume, points_mm: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """A scan's grey (n,) at the voxels next to points (n, 3), and which of these lie inside it."""
-    index, last = np.rint(scan.to_index(points_mm)).astype(np.intp), np.array(scan.shape) - 1
+    """A scan's grey (n,) at points (n, 3), and which of these lie inside it.
+
+    Between voxels: a bone's edge that moved by half a voxel, read at the next one, was as bright as a vessel.
+    """
+    index, last = scan.to_index(points_mm), np.array(scan.shape) - 1
     inside = np.all((index >= 0) & (index <= last), axis=1)
-    return scan.values[tuple(np.clip(index, 0, last).T)].astype(float), inside
+    grey = ndimage.map_coordinates(scan.values, index.T, np.float64, order=1, mode="nearest")
+    return np.asarray(grey), inside
 
 
 def _means(cell: NDArray[np.intp], values: NDArray[np.generic]) -> Array:

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy import ndimage
+from scipy.spatial import cKDTree
 from scipy.special import ndtr
 
 from pipeline.model import Lumen, Volume
 from pipeline.register import anchor, register
 from pipeline.register.frames import alignment_of, sentences_of
+from solver import Grid
 from tests.pipeline.test_bent import LATTICE, RADIUS, SKIP, distance, line, turned, wire
 
 MOUTH = line(0)[np.argmin(np.abs(line(0)[:, 2] - 15.0))]
@@ -56,3 +59,43 @@ def test_a_wire_that_leaves_the_lumen_is_no_branch() -> None:
     frame = scan(1, 0.0)
     out = frame.values + 1500.0 * np.exp(-0.5 * (distance(BRANCH) / 0.25) ** 2)
     assert not told(scan(0, 0.0), Volume(out.astype(np.int16), frame.spacing_mm, frame.origin_mm))
+
+
+@pytest.mark.parametrize("shift", [-0.5, -0.4, 0.5, 1.5])
+def test_bone_beside_the_vessel_is_no_branch_where_the_phantom_moved(shift: float) -> None:
+    """Once 9 cells: at the next voxel its edge is half a voxel off, a third of a step of four times the contrast."""
+    away, noise = distance(line(0)), np.random.default_rng(1).normal(0.0, NOISE, LATTICE.shape)
+    clean = 400.0 * ndtr((RADIUS - away) / 0.25) + 1600.0 * ndtr((away - RADIUS - 0.9) / 0.25)
+    moved = ndimage.shift(clean, (shift, 0.0, 0.0), order=1, mode="nearest")
+    lumen = Lumen(LATTICE.with_values((away - RADIUS).astype(np.float32)))
+    reference, frame = (
+        Volume((grey + rest).astype(np.int16), LATTICE.spacing_mm, LATTICE.origin_mm)
+        for grey, rest in ((clean, noise), (moved, noise[::-1]))
+    )
+    found = register(frame, anchor(reference, lumen), SKIP)
+    assert found.applied
+    assert not found.branch.told
+
+
+def test_what_lies_far_away_is_not_beside_the_lumen() -> None:
+    """Once all of the box was: segmentation cuts distances off at 3 mm, 4.3 of these voxels."""
+    cut = Lumen(LATTICE.with_values(np.minimum(distance(line(0)) - RADIUS, 1.2).astype(np.float32)))
+    reference = scan(0, 0.0)
+    shell = anchor(reference, cut).shell
+    assert cKDTree(line(0)).query(shell.points_mm)[0].max() < RADIUS + 1.2
+    assert len(shell.points_mm) > 1000
+
+
+def test_a_branch_is_told_in_thick_slices() -> None:
+    """Once two cells one above the other did not touch."""
+    lattice = Grid(np.zeros((60, 60, 34), np.float32), np.array([0.3, 0.3, 0.9]), LATTICE.origin_mm)
+    points = lattice.to_mm(np.stack(np.meshgrid(*map(np.arange, lattice.shape), indexing="ij"), -1).reshape(-1, 3))
+    tube, branch = (cKDTree(curve).query(points)[0].reshape(lattice.shape) for curve in (line(0), BRANCH))
+    noise = np.random.default_rng(2).normal(0.0, NOISE, (2, *lattice.shape))
+    deep = RADIUS - tube, np.maximum(RADIUS - tube, 1.0 - branch)
+    reference, frame = (
+        Volume((400.0 * ndtr(d / 0.3) + rest).astype(np.int16), lattice.spacing_mm, lattice.origin_mm)
+        for d, rest in zip(deep, noise, strict=True)
+    )
+    to = anchor(reference, Lumen(lattice.with_values((tube - RADIUS).astype(np.float32))))
+    assert register(frame, to, SKIP).branch.told

@@ -59,3 +59,18 @@ def test_a_vessel_as_wide_as_the_references_is_silent(vessel: float, voxels: flo
     assert abs(found.wider.voxels) < 0.1
     assert not found.wider.told
     assert found.wider.off_mm == 0.0
+
+
+@pytest.mark.parametrize(("radius", "metal", "beside"), [(1.0, 1500.0, 0.0), (1.2, 4000.0, 0.9), (0.8, 900.0, 0.0)])
+def test_the_skirts_of_a_wire_that_fills_its_vessel_are_no_wall(radius: float, metal: float, beside: float) -> None:
+    """Once 0.3 to 0.8 voxel, told: what lay next to metal all along was taken for wall."""
+    away = distance(line(0))
+    clean = 400.0 * ndtr((radius - away) / 0.25)
+    wired = clean + metal * np.exp(-0.5 * (distance(line(0) + [beside, 0.0, 0.0]) / 0.25) ** 2)
+    noise = np.random.default_rng(5).normal(0.0, NOISE, (2, *LATTICE.shape))
+    reference, frame = (
+        Volume((grey + rest).astype(np.int16), LATTICE.spacing_mm, LATTICE.origin_mm)
+        for grey, rest in zip((clean, wired), noise, strict=True)
+    )
+    to = anchor(reference, Lumen(LATTICE.with_values((away - radius).astype(np.float32))))
+    assert not register(frame, to, SKIP).wider.told
