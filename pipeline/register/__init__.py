@@ -200,7 +200,9 @@ def _with_rest(found: Registration, frame: Volume, to: Anchor, last: Solved | No
     """With what the motion does not explain of the wall, and what is seen beside it. last, taken : as for ``bent``."""
     if last is None:
         return found
-    off, more = bent(to.wall, last, taken=taken), wider(to.wall, last, to.brighter, taken=taken)
+    off = bent(to.wall, last, taken=taken)
+    # a wall that bends is off on one side more than on the other: in vessels of 2 voxels radius that looked narrower
+    more = Wider() if off.told else wider(to.wall, last, to.brighter, taken=taken)
     branch = branch_in(frame, to.shell, found.motion, float(np.median(last.gains)), to.contrast)
     return replace(found, bent=off, wider=more, branch=branch)
 
