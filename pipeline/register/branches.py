@@ -33,8 +33,10 @@ SURE = 6.0
 """Noises of the cells (by what they differ where nothing is) from which one is asked."""
 DARK = 0.5
 """Darker cells per brighter one from which neither is medium: bone that moved by itself and streaks have both."""
-APART, BESIDE_METAL = 1.8, 2.0
-"""Cell edges between the centres of two that touch, and within which metal's blur reaches."""
+APART, BESIDE_OTHER = 1.8, 2.0
+"""Cell edges between the centres of two that touch, and from metal or padding within which nothing is believed."""
+NO_NOISE = 1e-9
+"""Variance over the squared contrast below which a cell is padding."""
 
 
 class Branch(NamedTuple):
@@ -87,15 +89,17 @@ def branch_in(frame: Volume, shell: Shell, motion: Motion, gain: float, contrast
     seen = _means(shell.cell, inside) == 1.0
     if not seen.any() or not gain * contrast:
         return Branch()
-    more = (_means(shell.cell, grey) - gain * shell.grey) / (gain * contrast)
+    mean = _means(shell.cell, grey)
+    more = (mean - gain * shell.grey) / (gain * contrast)
     more -= np.median(more[seen])
     high = seen & (np.abs(more) > max(AS_BRIGHT[0], SURE * MAD * float(np.median(np.abs(more[seen])))))
-    metal, filled = high & (np.abs(more) > AS_BRIGHT[1]), high & (more > 0.0) & (more < AS_BRIGHT[1])
+    padded = _means(shell.cell, (grey - mean[shell.cell]) ** 2) < NO_NOISE * (gain * contrast) ** 2
+    other, filled = padded | (high & (np.abs(more) > AS_BRIGHT[1])), high & (more > 0.0) & (more < AS_BRIGHT[1])
     if np.count_nonzero(high & (more < 0.0)) > DARK * np.count_nonzero(filled):
         return Branch()
     centres = shell.centre_mm[filled]
-    if metal.any() and len(centres):
-        centres = centres[cKDTree(shell.centre_mm[metal]).query(centres)[0] > BESIDE_METAL * shell.edge_mm]
+    if other.any() and len(centres):
+        centres = centres[cKDTree(shell.centre_mm[other]).query(centres)[0] > BESIDE_OTHER * shell.edge_mm]
     if not len(centres):
         return Branch()
     beside = cKDTree(centres).query_ball_point(centres, APART * shell.edge_mm, return_length=True)

@@ -77,6 +77,12 @@ def test_bone_beside_the_vessel_is_no_branch_where_the_phantom_moved(shift: floa
     assert not found.branch.told
 
 
+def test_padding_in_the_frame_is_no_branch() -> None:
+    frame = scan(1, 0.0)
+    padded = np.where(np.arange(LATTICE.shape[0])[:, None, None] > 48, np.int16(300), frame.values)
+    assert not told(scan(0, 0.0), Volume(padded, frame.spacing_mm, frame.origin_mm))
+
+
 def test_what_lies_far_away_is_not_beside_the_lumen() -> None:
     """Once all of the box was: segmentation cuts distances off at 3 mm, 4.3 of these voxels."""
     cut = Lumen(LATTICE.with_values(np.minimum(distance(line(0)) - RADIUS, 1.2).astype(np.float32)))
