@@ -130,10 +130,13 @@ def contacts(distance: Grid, least_area: float = 0.0) -> tuple[Contact, ...]:
     found = meetings(voxels, owner, cores, np.ceil(FAR * thick / voxel).astype(np.int32))
     if len(found) < LEAST_FACES:
         return ()
-    every = -(-len(found) // MOST_FACES)
-    found = found[::every]
     at = unflattened(inner, values.shape)
-    found = found[_go_on(found, voxels, cores, thick / voxel) & ~_in_crotch(found, at, spacing, cores, thick)]
+    every = -(-len(found) // MOST_FACES)
+    # of all faces: between some of them only, an opening falls into parts, of which one alone is at the fork
+    opening = parts(at[found[:, 0]].astype(float), ADJACENT)[::every]
+    found = found[::every]
+    crotch = _in_crotch(found, opening, at, spacing, cores, thick)
+    found = found[_go_on(found, voxels, cores, thick / voxel) & ~crotch]
     if len(found) == 0:
         return ()
     # a face stands for as many as were passed over, of an area each
@@ -155,8 +158,10 @@ def _go_on(found: Index, voxels: Inner, cores: Cores, radius: Array) -> NDArray[
     return np.array([passes[p] and passes[q] for _, p, q in found], bool)
 
 
-def _in_crotch(found: Index, at: Index, spacing: Array, cores: Cores, thick: Array) -> NDArray[np.bool_]:
-    """Whether ``meetings`` found (m, 3) belong to an opening at which one vessel branches from the other.
+def _in_crotch(
+    found: Index, opening: Index, at: Index, spacing: Array, cores: Cores, thick: Array
+) -> NDArray[np.bool_]:
+    """Whether ``meetings`` found (m, 3), of openings (m,), belong to one at which one vessel branches from the other.
 
     At less than 45 degrees it is so long that at its far end both go on both ways. at : (n, 3) places in voxels.
     """
@@ -164,8 +169,8 @@ def _in_crotch(found: Index, at: Index, spacing: Array, cores: Cores, thick: Arr
     last = np.zeros(part.max() + 1, steps.dtype)
     np.maximum.at(last, part[part >= 0], steps[part >= 0])
     ends = np.flatnonzero((part >= 0) & ((steps == 0) | (steps == last[part])))
-    out, opening = np.zeros(len(found), bool), parts(at[found[:, 0]].astype(float), ADJACENT)
-    for n in range(opening.max() + 1):
+    out = np.zeros(len(found), bool)
+    for n in np.unique(opening):
         own = opening == n
         both_ways = np.concatenate([found[own, 1:], found[own, :0:-1]])
         for one in np.unique(part[both_ways[:, 0]]):

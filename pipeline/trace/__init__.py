@@ -11,7 +11,7 @@ from pipeline.model import Curve, Lumen, Volume
 from pipeline.ranges import Profile
 from pipeline.status import FrameStatus
 from pipeline.trace.attempt import EntryPose
-from pipeline.trace.coarse import ALL_OF_THEM, coarse_lumen, coarse_scan, times
+from pipeline.trace.coarse import ALL_OF_THEM, Times, coarse_lumen, coarse_scan, matching, times
 from pipeline.trace.config import TraceConfig
 from pipeline.trace.doubts import FAINT_BEYOND
 from pipeline.trace.elsewhere import hint_of_lines
@@ -76,12 +76,12 @@ def trace(
     config = config or TraceConfig()
     heading = np.asarray(entry_direction, float) / np.linalg.norm(np.asarray(entry_direction, float))
     stated = EntryPose(np.asarray(entry_mm, float), heading, expected_mm, Opacity.of(opacity))
-    curve = _seen((frame, reference, lumen), stated, previous, config)
+    scans = (frame, reference, lumen)
+    curve = _seen(scans, stated, previous, config)
     voxel = frame.voxel_mm
     larger, ok = times(frame), curve.status is FrameStatus.OK
     if larger != ALL_OF_THEM and (not ok or curve.levels.get("blur_mm", 0.0) > THICK_VOXELS * voxel):
-        seen, empty = coarse_scan(frame, larger), reference and coarse_scan(reference, larger)
-        again = _seen((seen, empty, coarse_lumen(lumen, seen)), stated, previous, config)
+        again = _seen(_coarse(scans, larger), stated, previous, config)
         if again.status is FrameStatus.OK and not (ok and _same(again, curve, voxel, 1.0)):
             curve = again
     if len(curve.points_mm) == 0:
@@ -94,10 +94,19 @@ def trace(
     return of_length(curve, expected_mm, config)
 
 
-def _seen(
-    scans: tuple[Volume, Volume | None, Lumen], stated: EntryPose, previous: Curve | None, config: TraceConfig
-) -> Curve:
-    """The wire of a frame, by its reference and lumen. stated : in LPS."""
+Scans = tuple[Volume, Volume | None, Lumen]
+"""A frame, its reference and lumen."""
+
+
+def _coarse(scans: Scans, n: Times) -> Scans:
+    """The same in larger voxels, so many of the frame's along each axis."""
+    frame, reference, lumen = scans
+    seen = coarse_scan(frame, n)
+    return seen, reference and coarse_scan(reference, matching(reference, seen)), coarse_lumen(lumen, seen)
+
+
+def _seen(scans: Scans, stated: EntryPose, previous: Curve | None, config: TraceConfig) -> Curve:
+    """The wire of a frame. stated : in LPS."""
     frame, reference, lumen = scans
     if not shows_lumen(frame, lumen):
         return Curve(np.zeros((0, 3)), np.zeros(0)).doubted(FrameStatus.NO_WIRE, OFF_THE_LUMEN)

@@ -9,7 +9,7 @@ from pipeline.model import Lumen, Volume
 from solver.grid import Grid, read_only
 
 COARSE_MM = 0.3
-"""Largest voxel that is made: guide wires are 0.3 to 1 mm thick."""
+"""Largest edge that the smallest one gets, and about that of the others: guide wires are 0.3 to 1 mm thick."""
 LEAST_VOXELS = 8
 """Fewest such voxels along an axis of the scan: a slab of fewer shows no line along it."""
 
@@ -20,9 +20,20 @@ _lumens, _scans = Last[Lumen](), Last[Volume]()
 
 
 def times(scan: Volume) -> Times:
-    """How many of a scan's voxels are averaged into one along each axis; 1 where they are large enough, or few."""
+    """How many of a scan's voxels are averaged into one along each axis; 1 where they are large enough, or few.
+
+    The nearest number: rounded down, 0.15 x 0.15 x 0.1503 mm became 0.3 x 0.3 x 0.15.
+    """
+    made = max(1, int(COARSE_MM / scan.voxel_mm + 1e-6)) * scan.voxel_mm
     along = zip(scan.shape, scan.spacing_mm, strict=True)
-    i, j, k = (max(1, min(int(COARSE_MM / size + 1e-6), count // LEAST_VOXELS)) for count, size in along)
+    i, j, k = (max(1, min(round(float(made / size)), count // LEAST_VOXELS)) for count, size in along)
+    return i, j, k
+
+
+def matching(grid: Grid, scan: Volume) -> Times:
+    """How many voxels of a grid, whose axes may be others, make about one of the scan's along each of its own axes."""
+    nearest = np.argmax(np.abs(grid.direction.T @ scan.direction), axis=1)
+    i, j, k = (max(1, round(float(ratio))) for ratio in scan.spacing_mm[nearest] / grid.spacing_mm)
     return i, j, k
 
 
@@ -45,9 +56,7 @@ def coarse_scan(scan: Volume, n: Times) -> Volume:
 
 
 def coarse_lumen(lumen: Lumen, scan: Volume) -> Lumen:
-    """The lumen on voxels of about that scan's; itself where its own, whose axes may be others, are as large."""
-    nearest = np.argmax(np.abs(lumen.distance.direction.T @ scan.direction), axis=1)
-    i, j, k = (max(1, round(float(ratio))) for ratio in scan.spacing_mm[nearest] / lumen.distance.spacing_mm)
-    if (n := (i, j, k)) == ALL_OF_THEM:
+    """The lumen on voxels of about that scan's; itself where its own are as large."""
+    if (n := matching(lumen.distance, scan)) == ALL_OF_THEM:
         return lumen
     return _lumens.of(lumen, n, lambda: replace(lumen, distance=_means(lumen.distance, n)))

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from pipeline.model import Branches, Lumen, Volume
 from pipeline.segment.config import SegmentConfig
 from pipeline.segment.given import given_lumen
-from pipeline.trace.coarse import ALL_OF_THEM, coarse_lumen, coarse_scan, times
+from pipeline.trace.coarse import ALL_OF_THEM, coarse_lumen, coarse_scan, matching, times
 from solver import Grid
 
 AS_LPS = np.eye(3)
@@ -21,11 +21,15 @@ def scan_of(
     return Volume(values.astype(np.float32), np.broadcast_to(spacing_mm, 3), np.zeros(3), direction)
 
 
-def test_no_voxel_is_made_larger_than_the_largest_along_any_axis() -> None:
-    """One factor, by the smallest edge, made 0.3 x 0.3 x 0.75 mm of 0.1 x 0.1 x 0.25: a fifth of frames was lost."""
+def test_voxels_are_made_of_about_the_largest_edge_along_each_axis() -> None:
+    """One factor, by the smallest edge, made 0.3 x 0.3 x 0.75 mm of 0.1 x 0.1 x 0.25: a fifth of frames was lost.
+
+    Rounded down, 0.15 x 0.15 x 0.1503 mm became 0.3 x 0.3 x 0.1503: 2 of 16 frames were.
+    """
     for spacing, shape, wanted in (
         ((0.1, 0.1, 0.25), (60, 60, 30), (3, 3, 1)), ((0.05, 0.15, 0.1), (60, 60, 60), (6, 2, 3)),
         ((0.1, 0.1, 0.1), (60, 60, 10), (3, 3, 1)), ((0.4, 0.3, 0.5), (60, 60, 60), ALL_OF_THEM),
+        ((0.15, 0.15, 0.1503), (60, 60, 60), (2, 2, 2)), ((0.1, 0.1, 0.16), (60, 60, 60), (3, 3, 2)),
     ):  # fmt: skip
         assert times(scan_of(*spacing, shape=shape)) == wanted
     scan = scan_of(0.1, 0.1, 0.25, shape=(60, 60, 30))
@@ -41,6 +45,14 @@ def test_a_lumen_whose_axes_are_others_is_as_coarse_as_the_scan_along_each() -> 
     lumen = Lumen(Grid(np.full((24, 24, 24), -1.0, np.float32), np.full(3, 0.1)))
     found = coarse_lumen(lumen, scan_of(0.1, 0.2, 0.3, direction=turned)).distance
     np.testing.assert_allclose(np.abs(turned.T @ found.spacing_mm), [0.1, 0.2, 0.3])
+
+
+def test_a_reference_whose_axes_are_others_is_as_coarse_as_its_frame_along_each() -> None:
+    """It took the frame's numbers along its own axes: 0.3 x 0.1 x 0.75 mm beside 0.3 x 0.3 x 0.25."""
+    seen = coarse_scan(scan := scan_of(0.1, 0.1, 0.25, shape=(60, 60, 30)), times(scan))
+    sagittal = scan_of(0.1, 0.25, 0.1, shape=(60, 30, 60), direction=np.eye(3)[[0, 2, 1]])
+    found = coarse_scan(sagittal, matching(sagittal, seen))
+    np.testing.assert_allclose(found.spacing_mm, [0.3, 0.25, 0.3])
 
 
 def test_a_lumen_in_voxels_as_large_stays_as_it_is() -> None:

@@ -23,7 +23,7 @@ from reports.case_files import frames_named
 AROUND = 5
 """Number of neighbouring frames whose median difference of traced length and stated depth is the usual one."""
 FEWEST, FEWEST_ALIKE = 4, 3
-"""Fewest frames for a check, and for that of what all are off by alike."""
+"""Fewest frames, or stated depths, for a check, and depths for that of what all are off by alike."""
 ALIKE = 0.8
 """Share of the frames that are off to one side, from which depths are counted from elsewhere."""
 SURE = 5.0
@@ -80,6 +80,17 @@ def traced_depths(frames: Sequence[Frame], entry_mm: ArrayLike, direction: Array
     return {f.index: depth_from(clamp, f.curve) for f in seen if f.curve is not None and np.isfinite(f.expected_mm)}
 
 
+def _by_stated_depth(frames: Sequence[Frame], depths_mm: Mapping[int, float]) -> tuple[Array, Array]:
+    """Each stated depth (n,), and the median (n,) of the traced ones there: scans of one depth share one reading.
+
+    depths_mm : of ``traced_depths``.
+    """
+    seen = [f for f in frames if f.index in depths_mm]
+    stated, of = np.unique([f.expected_mm for f in seen], return_inverse=True)
+    traced = np.array([depths_mm[f.index] for f in seen])
+    return stated, np.array([np.median(traced[of == n]) for n in range(len(stated))])
+
+
 def to_depth(frames: Sequence[Frame], depths_mm: Mapping[int, float], tolerance_mm: float) -> list[Frame]:
     """The frames; one that is deeper than stated, since its trace begins beyond the entry, is not to be trusted."""
     out = list(frames)
@@ -105,9 +116,10 @@ def stated_elsewhere(
     traced tips.     read_mm : of each stated depth by itself; None where the manifest does not state it.
     """
     seen = [f for f in frames if f.index in depths_mm]
-    if len(seen) < FEWEST_ALIKE:
+    stated, traced = _by_stated_depth(seen, depths_mm)
+    known = traced - stated
+    if len(known) < FEWEST_ALIKE:
         return []
-    known = np.array([depths_mm[f.index] - f.expected_mm for f in seen])
     tips = np.nan_to_num([0.0 if f.curve is None else f.curve.tip_sigma_mm for f in seen])
     limit = float(np.hypot(-ndtri(0.5 * CHANCE) * common_mm, _median_within(known, tips, read_mm)))
     usual = in_common(known, max(LEAST_MM, limit))
@@ -117,9 +129,9 @@ def stated_elsewhere(
     begins = f" and begin {late:.1f} mm beyond entry_mm" if late > LEAST_MM else ""
     return [
         f"the traced wires are {abs(usual):.1f} mm {'longer' if usual > 0 else 'shorter'} than insertion_mm states"
-        f"{begins} (median of {len(seen)} frames; chance explains {limit:.1f} mm): check from where depths were "
-        "counted, and entry_mm; the simulated wires go as deep as the traced ones, unless simulate.depth is manifest: "
-        f"then they end as much too {'shallow' if usual > 0 else 'deep'}"
+        f"{begins} (median of {len(known)} stated depths; chance explains {limit:.1f} mm): check from where depths "
+        "were counted, and entry_mm; the simulated wires go as deep as the traced ones, unless simulate.depth is "
+        f"manifest: then they end as much too {'shallow' if usual > 0 else 'deep'}"
     ]
 
 
@@ -138,20 +150,19 @@ def _median_within(apart: Array, tips_mm: Array, read_mm: float | None) -> float
 def on_another_scale(frames: Sequence[Frame], depths_mm: Mapping[int, float]) -> list[str]:
     """A warning where traced depths grow faster, or slower, than insertion_mm. depths_mm : of ``traced_depths``.
 
-    By least squares over the frames; a scale that is read by hand to 0.5 mm leaves a few per cent open.
+    By least squares over the stated depths; a scale that is read by hand to 0.5 mm leaves a few per cent open.
     """
-    known = [f for f in frames if f.index in depths_mm]
-    stated, traced = np.array([(f.expected_mm, depths_mm[f.index]) for f in known]).reshape(-1, 2).T
-    if len(known) < FEWEST or np.ptp(stated) == 0.0:
+    stated, traced = _by_stated_depth(frames, depths_mm)
+    if len(stated) < FEWEST:
         return []
     (slope, _), covariance = np.polyfit(stated, traced - stated, 1, cov=True)
     deviation = float(np.sqrt(covariance[0, 0]))
-    if abs(slope) < max(LEAST_SCALE, float(stdtrit(len(known) - 2, 1.0 - 0.5 * CHANCE)) * deviation):
+    if abs(slope) < max(LEAST_SCALE, float(stdtrit(len(stated) - 2, 1.0 - 0.5 * CHANCE)) * deviation):
         return []
     return [
         f"the traced wires grow {1.0 + slope:.3f} times as fast as insertion_mm states (standard deviation "
-        f"{deviation:.2g}, {len(known)} frames): is the scans' voxel size right, or the scale that depths were read "
-        "from? With a wrong size all lengths and errors are as wrong"
+        f"{deviation:.2g}, {len(stated)} stated depths): is the scans' voxel size right, or the scale that depths "
+        "were read from? With a wrong size all lengths and errors are as wrong"
     ]
 
 

@@ -100,8 +100,9 @@ def _in_step(run: Context, frames: list[Frame], voxel_mm: float) -> list[Frame]:
     run.log.warnings += swapped
     frames = frames if swapped else perhaps_turned(frames)
     common_mm = float(np.hypot(entry_sigma_mm(run.case, voxel_mm), TIP_VOXELS * voxel_mm))
-    run.log.warnings += stated_elsewhere(frames, depths_mm, common_mm, run.case.insertion_sigma_mm)
-    run.log.warnings += [] if swapped else on_another_scale(frames, depths_mm)
+    # a wrong scale moves the median, too: one cause is told
+    scaled = [] if swapped else on_another_scale(frames, depths_mm)
+    run.log.warnings += scaled or stated_elsewhere(frames, depths_mm, common_mm, run.case.insertion_sigma_mm)
     frames = in_step(to_depth(frames, depths_mm, tolerance_mm), voxel_mm)
     run.log.warnings += [*shrinking(frames, voxel_mm), *standing(frames, voxel_mm)]
     run.log.warnings += [] if swapped else drawn_back(frames, voxel_mm)
