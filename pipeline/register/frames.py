@@ -136,8 +136,8 @@ def _branches(found: Sequence[tuple[int, Branch]]) -> list[str]:
     return [
         f"{frames_named([n for n, _ in found])}: something as bright as the filled vessel lies beside the lumen, at "
         f"LPS mm ({spelt(clearest.at_mm)}) (frame {number}), where the reference has nothing: a branch that it "
-        "does not show, a sheath or a wire outside, or bone that moved; no simulated wire can go there: scan it as filled "
-        "as the frames are"
+        "does not show, a sheath or a wire outside, or bone that moved; no simulated wire can go there: scan it as "
+        "filled as the frames are"
     ]
 
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from pipeline.arrays.spare import Last
 from pipeline.model import Lumen, Volume
+from pipeline.trace.config import MOST_APART
 from solver.grid import Grid, read_only
 
 COARSE_MM = 0.3
@@ -22,8 +23,11 @@ _lumens, _scans = Last[Lumen](), Last[Volume]()
 def times(scan: Volume) -> Times:
     """How many of a scan's voxels are averaged into one along each axis; 1 where they are large enough, or few.
 
-    The nearest number: rounded down, 0.15 x 0.15 x 0.1503 mm became 0.3 x 0.3 x 0.15.
+    The nearest number: rounded down, 0.15 x 0.15 x 0.1503 mm became 0.3 x 0.3 x 0.15. 1 too where slices lie so far
+    apart that no trace is accepted: in larger pixels they no longer look it, and 10 of 75 traces were cut short.
     """
+    if scan.spacing_mm.max() >= MOST_APART * scan.voxel_mm:
+        return ALL_OF_THEM
     made = max(1, int(COARSE_MM / scan.voxel_mm + 1e-6)) * scan.voxel_mm
     along = zip(scan.shape, scan.spacing_mm, strict=True)
     i, j, k = (max(1, min(round(float(made / size)), count // LEAST_VOXELS)) for count, size in along)

@@ -27,8 +27,9 @@ def test_voxels_are_made_of_about_the_largest_edge_along_each_axis() -> None:
     Rounded down, 0.15 x 0.15 x 0.1503 mm became 0.3 x 0.3 x 0.1503: 2 of 16 frames were.
     """
     for spacing, shape, wanted in (
-        ((0.1, 0.1, 0.25), (60, 60, 30), (3, 3, 1)), ((0.05, 0.15, 0.1), (60, 60, 60), (6, 2, 3)),
+        ((0.1, 0.1, 0.25), (60, 60, 30), (3, 3, 1)), ((0.05, 0.14, 0.1), (60, 60, 60), (6, 2, 3)),
         ((0.1, 0.1, 0.1), (60, 60, 10), (3, 3, 1)), ((0.4, 0.3, 0.5), (60, 60, 60), ALL_OF_THEM),
+        ((0.15, 0.15, 0.75), (60, 60, 60), ALL_OF_THEM),
         ((0.15, 0.15, 0.1503), (60, 60, 60), (2, 2, 2)), ((0.1, 0.1, 0.16), (60, 60, 60), (3, 3, 2)),
     ):  # fmt: skip
         assert times(scan_of(*spacing, shape=shape)) == wanted

@@ -127,11 +127,12 @@ def stated_elsewhere(
         return []
     late = float(np.median([depths_mm[f.index] - f.curve.length_mm for f in seen if f.curve is not None]))
     begins = f" and begin {late:.1f} mm beyond entry_mm" if late > LEAST_MM else ""
+    faint = "" if usual > 0 else ", and whether traces end where the wire gets faint (a plastic tip: state opacity)"
     return [
         f"the traced wires are {abs(usual):.1f} mm {'longer' if usual > 0 else 'shorter'} than insertion_mm states"
         f"{begins} (median of {len(known)} stated depths; chance explains {limit:.1f} mm): check from where depths "
-        "were counted, and entry_mm; the simulated wires go as deep as the traced ones, unless simulate.depth is "
-        f"manifest: then they end as much too {'shallow' if usual > 0 else 'deep'}"
+        f"were counted, and entry_mm{faint}; the simulated wires go as deep as the traced ones, unless simulate.depth "
+        f"is manifest: then they end as much too {'shallow' if usual > 0 else 'deep'}"
     ]
 
 
