@@ -35,6 +35,8 @@ DARK = 0.5
 """Darker cells per brighter one from which neither is medium: bone that moved by itself and streaks have both."""
 APART, BESIDE_OTHER = 1.8, 2.0
 """Cell edges between the centres of two that touch, and from metal or padding within which nothing is believed."""
+ON_A_VOXEL = 1e-3
+"""Voxels from a voxel's centre within which its grey is taken, in a sixth of the time."""
 NO_NOISE = 1e-9
 """Variance over the squared contrast below which a cell is padding."""
 
@@ -112,7 +114,10 @@ def _grey(scan: Volume, points_mm: Array) -> tuple[Array, NDArray[np.bool_]]:
     Between voxels: a bone's edge that moved by half a voxel, read at the next one, was as bright as a vessel.
     """
     index, last = scan.to_index(points_mm), np.array(scan.shape) - 1
-    inside = np.all((index >= 0) & (index <= last), axis=1)
+    inside = np.all((index > -ON_A_VOXEL) & (index < last + ON_A_VOXEL), axis=1)
+    nearest = np.rint(index)
+    if np.max(np.abs(index - nearest), initial=0.0) < ON_A_VOXEL:  # as of all frames that did not move
+        return scan.values[tuple(np.clip(nearest, 0, last).astype(np.intp).T)].astype(np.float64), inside
     grey = ndimage.map_coordinates(scan.values, index.T, np.float64, order=1, mode="nearest")
     return np.asarray(grey), inside
 
