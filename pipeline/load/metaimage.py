@@ -109,9 +109,10 @@ def _axes(path: Path, tags: dict[str, str]) -> tuple[int, tuple[int, int, int], 
 def _begin(name: Path, header: Path, tags: dict[str, str], end: int, voxel_bytes: int) -> int:
     """The byte of a data file where its voxels begin."""
     skipped = int(numbers(header, tags, "HeaderSize", 1, whole=True, missing="0")[0])
+    least = end if name == header else 0
     if skipped == -1:
-        return max(size_of(name) - voxel_bytes, 0)
-    return end if name == header else max(skipped, 0)
+        return max(size_of(name) - voxel_bytes, least)
+    return least or max(skipped, 0)
 
 
 def _files(path: Path, text: str, below: str, planes: int) -> list[Path]:

@@ -80,12 +80,10 @@ def head_of(path: Path) -> Head:
     if packing != "ascii" and stored.itemsize > 1 and "endian" not in fields:
         raise unusable(path, f"no endian for {stored.itemsize} bytes a voxel; allowed: little, big; correct the header")
     files = _files(path, fields, shape[2] * items)
-    voxel_bytes = int(np.prod(shape)) * items * channels * stored.itemsize
+    share = int(np.prod(shape)) * items * channels * stored.itemsize // len(files)
     skipped, packed = _byte_skip(path, fields, packing), packing in ("deflate", "bzip2")
-    if skipped == -1:
-        parts = tuple((name, max(size_of(name) - voxel_bytes // len(files), 0)) for name in files)
-    else:
-        parts = tuple((name, _begin(name, path, fields, begin) + (0 if packed else skipped)) for name in files)
+    lines, raw = _line_skip(path, fields), 0 if packed else skipped
+    parts = tuple((name, _begin(name, begin if name == path else 0, lines, raw, share)) for name in files)
     geometry, assumed = _geometry(path, fields, vectors, int(leading))
     return Head(
         path, shape, stored, parts, *geometry, packing=packing, before=skipped if packed else 0,
@@ -131,19 +129,28 @@ def _byte_skip(path: Path, fields: dict[str, str], packing: str) -> int:
     return skipped
 
 
-def _begin(name: Path, header: Path, fields: dict[str, str], begin: int) -> int:
-    """The byte of a data file after the lines that it skips: packed or not, lines are counted as they lie there."""
-    lines = int(numbers(header, fields, "line skip", 1, whole=True, missing="0")[0])
-    at = begin if name == header else 0
+def _line_skip(path: Path, fields: dict[str, str]) -> int:
+    """Lines before the voxels."""
+    lines = int(numbers(path, fields, "line skip", 1, whole=True, missing="0")[0])
     if not 0 <= lines <= MOST_LINES:
-        raise unusable(header, f"line skip {lines}; allowed: 0 to {MOST_LINES}; correct the header")
+        raise unusable(path, f"line skip {lines}; allowed: 0 to {MOST_LINES}; correct the header")
+    return lines
+
+
+def _begin(name: Path, at: int, lines: int, skipped: int, voxel_bytes: int) -> int:
+    """The byte of a data file where its voxels begin: so many lines and bytes after byte ``at``.
+
+    Packed or not, lines are counted as they lie there. skipped : -1 for all that the voxels leave, lines and bytes.
+    """
+    if skipped == -1:
+        return max(size_of(name) - voxel_bytes, at)
     if lines:
         with opened(name) as file:
             file.seek(at)
             for _ in range(lines):
                 file.readline(LONGEST_HEADER)
             at = file.tell()
-    return at
+    return at + skipped
 
 
 MOST_LINES = 1000

@@ -94,6 +94,11 @@ def require_data(head: Head, most_gib: float, *, whole: bool = True) -> Head:
     require_room(head.path, head.plane_bytes * head.shape[2], 0, "", most_gib)
     for path, offset in head.parts:
         there = size_of(path) - offset
+        if there < 0:
+            why = f"the header lets its voxels begin at byte {offset}, the file has {size_of(path)} bytes"
+            raise unusable(
+                path, f"{why}; correct the header (byte skip, HeaderSize, vox_offset), or copy the file again"
+            )
         require_room(path, need, there, head.packing, most_gib)
         if head.packing in ("deflate", "bzip2") and there < 8:
             raise unusable(path, "no voxels after the header; the file is cut short: copy it again")

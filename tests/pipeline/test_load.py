@@ -154,11 +154,26 @@ def test_what_an_nrrd_cannot_skip_is_refused(tmp_path: Path) -> None:
         ("gzip", "byte skip: -1", "byte skip -1 with encoding gzip; allowed: 0 or more, and -1 if raw"),
         ("raw", "byte skip: -2", "byte skip -2 with encoding raw"),
         ("raw", "line skip: 1001", "line skip 1001; allowed: 0 to 1000"),
+        ("raw", "byte skip: -1\nline skip: -5", "line skip -5; allowed: 0 to 1000"),
+        ("raw", "byte skip: 5000", r"begin at byte 5\d{3}, the file has \d{3} bytes; correct the header"),
     )
     for encoding, skip, said in refused:
         path.write_bytes(nrrd_of(gzip.compress(voxels), f"encoding: {encoding}", skip))
         with pytest.raises(LoadError, match=said):
             read_header(path)
+
+
+def test_voxels_at_the_end_of_a_file_do_not_begin_in_its_header(tmp_path: Path) -> None:
+    """Of a file that was cut short the header's last bytes were read as voxels."""
+    voxels = numbered().tobytes(order="F")
+    nrrd = nrrd_of(voxels, "encoding: raw", "byte skip: -1")
+    mha = b"NDims = 3\nDimSize = 5 7 9\nElementType = MET_SHORT\nHeaderSize = -1\nElementDataFile = LOCAL\n" + voxels
+    for name, content in (("a.nrrd", nrrd), ("a.mha", mha)):
+        (tmp_path / name).write_bytes(content)
+        np.testing.assert_array_equal(load(read_header(tmp_path / name)).values, numbered())
+        (tmp_path / name).write_bytes(content[:-20])
+        with pytest.raises(LoadError, match="cut short: 610 bytes of voxels, the header asks for 630"):
+            load(read_header(tmp_path / name))
 
 
 def test_what_follows_a_bzip2_stream_is_seen_wherever_a_crop_ends(tmp_path: Path) -> None:

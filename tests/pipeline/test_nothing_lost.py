@@ -619,7 +619,6 @@ def test_an_executor_that_is_not_there_is_refused(
 
 AT_A_FORK = """
 import os, signal, sys
-from pipeline.__main__ import main as as_program
 from pipeline.cli import main
 os.register_at_fork(after_in_parent=lambda: os.kill(os.getpid(), int(sys.argv[1])))
 sys.exit(main(["synth", "straight", "-o", sys.argv[2], "--size", "72", "--insertions", "2", "-j", "2"]))

@@ -402,6 +402,27 @@ def test_a_case_page_says_who_is_judged_over_the_run_alone(tmp_path: Path, skill
 
 
 @pytest.mark.usefixtures("scarce")
+def test_what_one_insertion_shows_of_others_is_said_on_the_first_page_alone(tmp_path: Path) -> None:
+    """Each case is one: the pages of all were amber, in a run of twenty cases, too."""
+    folder = write_run(tmp_path / "out", (FakeCase("a", 3),)) / "cases" / "a"
+    one = {
+        "skill_strongest": 0.9,
+        "strongest_null": "previous",
+        "interval": "interval withheld: 1 insertion, at least 3",
+    }
+    result = json.loads((folder / "result.json").read_text(encoding="utf-8"))
+    result["summary"] |= one
+    (folder / "result.json").write_text(json.dumps(result), encoding="utf-8")
+    page = render_case(folder).read_text(encoding="utf-8")
+    assert '<span class="status good">ok</span>' in page
+    assert "about others" not in page
+    for name in ("summary.csv", "overall.csv"):
+        rows = tables.read(tmp_path / "out" / name, SUMMARY)
+        tables.write(tmp_path / "out" / name, SUMMARY, rows.assign(**one))
+    assert "one insertion shows nothing about others" in render_index(tmp_path / "out").read_text(encoding="utf-8")
+
+
+@pytest.mark.usefixtures("scarce")
 def test_a_scan_that_the_roll_was_fitted_on_is_no_frame_that_is_ok(tmp_path: Path) -> None:
     """Six scans were "Every frame is ok" and "5 frames: 5 ok"."""
     out = write_run(tmp_path / "out", (FakeCase("a", 5),))
