@@ -16,9 +16,10 @@ FIRST_VOXELS, VOXELS = 2.0, 4
 """Where, and over what length, the grey ahead is averaged: beyond the wire's own blur."""
 WIDEST_RAD = 0.5
 """How far off the curve's last direction: the wire bends."""
-HIDDEN = 0.25
+HIDDEN = 0.19
 """Share of the wire's brightness, and of the contrast medium's, that the reference has there at the least: it had at
-most 0.08 ahead of tips that are right (100 traces), and 0.30 and more where a piece of wire in it bends away."""
+most 0.08 ahead of tips that are right (200 traces), 0.15 in correlated noise, and 0.23 and more where a piece of wire
+in it bends away."""
 DARK = 6.0
 """Noises by which the darkest way on stands out, over its length, from what is as far from the end: it had at most 4.6
 where nothing lay ahead (110 tips), and 7.7 and more along 4 to 8 mm of a wire less dense than the contrast medium."""

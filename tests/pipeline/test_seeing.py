@@ -138,6 +138,12 @@ def test_a_marker_band_does_not_draw_the_tip_to_itself(seed):
     assert abs(row.tip) < 3.0, "stated standard deviations; 4.6 and 6.9 where the band is taken for noise"
 
 
+def test_a_piece_of_wire_in_the_reference_that_bends_away_is_told():
+    assert look("a piece of wire in the reference, where the wire ends", 2740).verdict == "refused", (
+        "6 mm short, and ok"
+    )
+
+
 def test_without_its_reference_a_frame_is_not_believed_alone():
     """Once ok and 7.6 voxels wrong: in correlated noise the wall's model leaves lines of its own."""
     assert look("correlated noise, CNR 4 to 6", 305).verdict == "refused"
