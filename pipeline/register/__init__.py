@@ -7,6 +7,7 @@ not agree. The cheap look then says what is left.
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,10 +16,11 @@ from pipeline.arrays.grids import unflattened
 from pipeline.model import Array, Lumen, Volume
 from pipeline.register.bent import Bent, bent
 from pipeline.register.branches import Branch, Shell, branch_in, shell_of
+from pipeline.register.left import left_of
 from pipeline.register.padding import Padding, off_the_rim, padding_in, unpadded
 from pipeline.register.patches import LEAST_MM, SPAN_RADII
 from pipeline.register.rigid import Motion, edge_mask, rigid
-from pipeline.register.shift import Fit, Solved, StaticPoints, farthest, fit_motion, look, static_points
+from pipeline.register.shift import MOST_METAL, Fit, Solved, StaticPoints, farthest, fit_motion, look, static_points
 from pipeline.register.slide import hidden, slid
 from pipeline.register.wider import Wider, wider
 from solver.grid import Grid
@@ -103,6 +105,21 @@ class Anchor:
         return [one for one in found if len(one.points_mm) >= WALL_POINTS]
 
 
+class Rest(Protocol):
+    """What a frame shows that no rigid motion of the phantom explains."""
+
+    @property
+    def told(self) -> bool:
+        """Whether it is more than noise."""
+
+    @property
+    def size(self) -> float:
+        """By which the worst frame is found."""
+
+    def sentence(self, frame: int) -> str:
+        """A warning, by the worst frame."""
+
+
 @dataclass(frozen=True, eq=False)
 class Registration:
     """The motion of one frame against the reference; ``applied`` False where it is too small or not ``trusted``.
@@ -125,6 +142,11 @@ class Registration:
     bent: Bent = field(default_factory=Bent)
     wider: Wider = field(default_factory=Wider)
     branch: Branch = field(default_factory=Branch)
+
+    @property
+    def rests(self) -> tuple[Rest, ...]:
+        """What the motion does not explain, in the order in which it is told."""
+        return self.bent, self.wider, self.branch
 
     @property
     def trusted(self) -> bool:
@@ -202,13 +224,15 @@ def _best(frame: Volume, to: Anchor) -> Motion:
 
 
 def _with_rest(found: Registration, frame: Volume, to: Anchor, last: Solved | None, *, taken: bool) -> Registration:
-    """With what the motion does not explain of the wall, and what is seen beside it. last, taken : as for ``bent``."""
+    """With what the motion does not explain of the wall, and what is seen beside it. last, taken : of ``left_of``."""
     if last is None:
         return found
-    off = bent(to.wall, last, taken=taken)
+    left = left_of(to.wall, last, taken=taken)
+    off = bent(to.wall, left)
     # a wall that bends is off on one side more than on the other: in vessels of 2 voxels radius that looked narrower
-    judged = to.roomy and not off.told
-    more = wider(to.wall, last, to.brighter, taken=taken) if judged else Wider()
+    # beside so much metal its skirts are what is left
+    judged = to.roomy and not off.told and np.mean(last.clear) >= MOST_METAL
+    more = wider(to.wall, left, to.brighter) if judged else Wider()
     branch = branch_in(frame, to.shell, found.motion, float(np.median(last.gains)), to.contrast)
     return replace(found, bent=off, wider=more, branch=branch)
 

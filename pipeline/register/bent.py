@@ -11,15 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from pipeline.arrays.grids import MAD
+from pipeline.arrays.grids import MAD, spelt
 from pipeline.model import Array
+from pipeline.register.left import Left
 from pipeline.register.patches import PATCH_POINTS, TINY, means, products, shaded, spread_out
-from pipeline.register.shift import METAL_SCALES, METAL_VOXELS, TUKEY, Solved, StaticPoints, near_metal
+from pipeline.register.shift import TUKEY, StaticPoints
 
 ROUNDS = 2
 """Times that a patch's shift is found; the weights against metal are worked out anew between them."""
-BRIGHTER = 0.1
-"""Metal is brighter than the brightest of a patch by so much of its contrast: a moved wall is not."""
 ACROSS = 0.1
 """Squared steepness over that of the steepest direction from which a shift shows: along a vessel it is noise."""
 OF_NOISE = 2.0 * 1.386
@@ -63,6 +62,21 @@ class Bent:
         return self.rms_voxels > TOLD_VOXELS
 
     @property
+    def size(self) -> float:
+        """By which the worst frame is found."""
+        return self.rms_voxels
+
+    def sentence(self, frame: int) -> str:
+        """A warning, by the worst frame."""
+        return (
+            "the vessel's wall fits no rigid motion of the phantom, up to "
+            f"{self.rms_voxels:.2f} voxel rms are left (frame {frame}, {self.most_voxels:.2f} at LPS mm "
+            f"({spelt(self.worst_mm)})): it is soft and bends, the wire pushes it aside, or slices of the scan lie "
+            "aside; traces may lie beside the lumen by as much, which trace_sigma_mm includes; hold the vessel in "
+            "place all along, and scan it anew"
+        )
+
+    @property
     def most_voxels(self) -> float:
         """The most of a pair."""
         return float(np.sqrt(max(0.0, self.power.max(initial=0.0))))
@@ -81,14 +95,12 @@ class Bent:
         return np.asarray(self.voxel_mm * np.sqrt(np.maximum(self.power[nearest], self.rms_voxels**2)))
 
 
-def bent(s: StaticPoints, last: Solved, *, taken: bool = False) -> Bent:
-    """The wall's residual place by place. last : the rigid fit's last step; ``taken`` off what is left, or not."""
+def bent(s: StaticPoints, left: Left) -> Bent:
+    """The wall's residual place by place. left : by the rigid fit."""
     count = len(s.grey)
     if len(s.starts) < 2:
         return Bent()
-    gain = gain_at(s, last)
-    clear = clear_of_metal(s, last, gain)
-    shift, known = _shifts(s, gain, last.rest if taken else last.rest + last.change, clear)
+    shift, known = _shifts(s, left)
     at, size = means(s.points_mm, s.starts), np.diff(s.starts, append=count)
     both = known[::2] & known[1::2]
     one, other = shift[::2][both], shift[1::2][both]
@@ -97,24 +109,9 @@ def bent(s: StaticPoints, last: Solved, *, taken: bool = False) -> Bent:
     return Bent(centres, np.sum(one * other, axis=1), points, noise, s.voxel_mm)
 
 
-def gain_at(s: StaticPoints, last: Solved) -> Array:
-    """The gain (n,) of grey at each point."""
-    count = len(s.grey)
-    return np.repeat(last.gains, count) if len(last.gains) == 1 else spread_out(last.gains, s.starts, count)
-
-
-def clear_of_metal(s: StaticPoints, last: Solved, gain: Array) -> NDArray[np.bool_]:
-    """Which points (n,) are away from metal: brighter than expected, and than what a wall that moved shows."""
-    clear, doubtful = np.ones(len(gain), bool), np.flatnonzero(~last.clear)
-    top, bottom = (spread_out(of.reduceat(s.centred, s.starts), s.starts, len(gain)) for of in (np.maximum, np.minimum))
-    above = last.rest + gain * (s.centred - top - BRIGHTER * (top - bottom))
-    metal = np.minimum(last.rest, above) > METAL_SCALES * last.scale
-    clear[doubtful] = ~near_metal(s.points_mm[doubtful], metal[doubtful], METAL_VOXELS * s.voxel_mm)
-    return clear
-
-
-def _shifts(s: StaticPoints, gain: Array, grey: Array, used: NDArray[np.bool_]) -> tuple[Array, NDArray[np.bool_]]:
+def _shifts(s: StaticPoints, left: Left) -> tuple[Array, NDArray[np.bool_]]:
     """Each patch's shift (k, 3), voxels, and whether it has points enough; robust."""
+    gain, grey, used = left
     count, weights = len(grey), used.astype(float)
     design = -s.voxel_mm * gain[:, None] * s.gradient
     rows = np.column_stack([design, np.ones(count), s.centred, grey])

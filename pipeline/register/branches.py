@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
-from pipeline.arrays.grids import MAD, unflattened
+from pipeline.arrays.grids import spelt, spread, unflattened
 from pipeline.model import Array, Volume
 from pipeline.register.rigid import Motion
 from solver.grid import Grid
@@ -51,6 +51,19 @@ class Branch(NamedTuple):
     def told(self) -> bool:
         """Whether it is more than noise, and than a bare wire that passes there."""
         return self.cells >= LEAST_CELLS
+
+    @property
+    def size(self) -> float:
+        """By which the clearest frame is found."""
+        return self.cells
+
+    def sentence(self, frame: int) -> str:
+        """A warning, by the clearest frame."""
+        return (
+            f"something as bright as the filled vessel lies beside the lumen, at LPS mm ({spelt(self.at_mm)}) (frame "
+            f"{frame}), where the reference has nothing: a branch that it does not show, a sheath or a wire outside, "
+            "or bone that moved; no simulated wire can go there: scan it as filled as the frames are"
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +107,7 @@ def branch_in(frame: Volume, shell: Shell, motion: Motion, gain: float, contrast
     mean = _means(shell.cell, grey)
     more = (mean - gain * shell.grey) / (gain * contrast)
     more -= np.median(more[seen])
-    high = seen & (np.abs(more) > max(AS_BRIGHT[0], SURE * MAD * float(np.median(np.abs(more[seen])))))
+    high = seen & (np.abs(more) > max(AS_BRIGHT[0], SURE * spread(more[seen])))
     padded = _means(shell.cell, (grey - mean[shell.cell]) ** 2) < NO_NOISE * (gain * contrast) ** 2
     other, filled = padded | (high & (np.abs(more) > AS_BRIGHT[1])), high & (more > 0.0) & (more < AS_BRIGHT[1])
     if np.count_nonzero(high & (more < 0.0)) > DARK * np.count_nonzero(filled):

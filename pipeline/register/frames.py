@@ -5,13 +5,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.arrays.grids import sampled, spelt
+from pipeline.arrays.grids import sampled
 from pipeline.model import Curve, Lumen, Volume
-from pipeline.register import Anchor, Registration, anchor, register
-from pipeline.register.bent import Bent
-from pipeline.register.branches import Branch
+from pipeline.register import Anchor, Registration, Rest, anchor, register
 from pipeline.register.rigid import Motion
-from pipeline.register.wider import Wider
 from reports.alike import in_words
 from reports.case_files import frames_named
 
@@ -95,50 +92,18 @@ def sentences_of(alignment: Alignment, found: Mapping[int, Registration | None])
         if not r.trusted or (r.applied and r.doubt):
             doubtful.setdefault(r.sentence, []).append(n)
     told = [f"frame{'s' * (len(numbers) > 1)} {in_words(numbers)}: {text}" for text, numbers in doubtful.items()]
-    told += _bent([(n, r.bent) for n, r in known if r.bent.told])
-    told += _wider([(n, r.wider) for n, r in known if r.wider.told])
-    return texts, told + _branches([(n, r.branch) for n, r in known if r.branch.told])
+    return texts, told + _of_rests([(n, r.rests) for n, r in known])
 
 
-def _bent(found: Sequence[tuple[int, Bent]]) -> list[str]:
-    """A warning where the wall of frames (number, what is left) lies where no rigid motion takes it."""
-    if not found:
-        return []
-    number, worst = max(found, key=lambda pair: pair[1].rms_voxels)
-    place = spelt(worst.worst_mm)
-    return [
-        f"{frames_named([n for n, _ in found])}: the vessel's wall fits no rigid motion of the phantom, up to "
-        f"{worst.rms_voxels:.2f} voxel rms are left (frame {number}, {worst.most_voxels:.2f} at LPS mm ({place})): it "
-        "is soft and bends, the wire pushes it aside, or slices of the scan lie aside; traces may lie beside the lumen "
-        "by as much, which trace_sigma_mm includes; hold the vessel in place all along, and scan it anew"
-    ]
-
-
-def _wider(found: Sequence[tuple[int, Wider]]) -> list[str]:
-    """A warning where the wall of frames (number, by how much) lies outside, or inside, the reference's all around."""
-    if not found:
-        return []
-    number, worst = max(found, key=lambda pair: abs(pair[1].voxels))
-    side = "outside" if worst.voxels > 0.0 else "inside"
-    return [
-        f"{frames_named([n for n, _ in found])}: the vessel's wall lies {abs(worst.voxels) * worst.voxel_mm:.2f} mm "
-        f"{side} the reference's, all around (frame {number}): the reference shows another phantom, or this one at "
-        "another pressure, filled or reconstructed otherwise; the lumen is the reference's, where simulated wires have "
-        "too much or too little room, and traces are less sure by half of that; scan the reference as the frames are"
-    ]
-
-
-def _branches(found: Sequence[tuple[int, Branch]]) -> list[str]:
-    """A warning where frames (number, what is seen) show a vessel beside the lumen that the reference has not."""
-    if not found:
-        return []
-    number, clearest = max(found, key=lambda pair: pair[1].cells)
-    return [
-        f"{frames_named([n for n, _ in found])}: something as bright as the filled vessel lies beside the lumen, at "
-        f"LPS mm ({spelt(clearest.at_mm)}) (frame {number}), where the reference has nothing: a branch that it "
-        "does not show, a sheath or a wire outside, or bone that moved; no simulated wire can go there: scan it as "
-        "filled as the frames are"
-    ]
+def _of_rests(known: Sequence[tuple[int, tuple[Rest, ...]]]) -> list[str]:
+    """A warning for each kind of rest that is told of a frame. known : by frame, what its motion does not explain."""
+    said = []
+    for kind in zip(*([(n, rest) for rest in rests] for n, rests in known), strict=True):
+        told = [(n, rest) for n, rest in kind if rest.told]
+        if told:
+            number, worst = max(told, key=lambda one: one[1].size)
+            said.append(f"{frames_named([n for n, _ in told])}: {worst.sentence(number)}")
+    return said
 
 
 def widened(curve: Curve, found: Registration | None) -> Curve:

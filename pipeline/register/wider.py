@@ -8,11 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pipeline.arrays.grids import MAD
+from pipeline.arrays.grids import MAD, spread
 from pipeline.model import Array
-from pipeline.register.bent import clear_of_metal, gain_at
+from pipeline.register.left import Left
 from pipeline.register.patches import TINY, products, shaded
-from pipeline.register.shift import MOST_METAL, TUKEY, Solved, StaticPoints
+from pipeline.register.shift import TUKEY, StaticPoints
 
 ROUNDS = 3
 """Times that it is found; the weights are worked out anew between them."""
@@ -42,23 +42,36 @@ class Wider(NamedTuple):
         return abs(self.voxels) > max(TOLD_VOXELS, SURE * self.sd)
 
     @property
+    def size(self) -> float:
+        """By which the worst frame is found."""
+        return abs(self.voxels)
+
+    def sentence(self, frame: int) -> str:
+        """A warning, by the worst frame."""
+        side = "outside" if self.voxels > 0.0 else "inside"
+        return (
+            f"the vessel's wall lies {abs(self.voxels) * self.voxel_mm:.2f} mm {side} the reference's, all around "
+            f"(frame {frame}): the reference shows another phantom, or this one at another pressure, filled or "
+            "reconstructed otherwise; the lumen is the reference's, where simulated wires have too much or too little "
+            "room, and traces are less sure by half of that; scan the reference as the frames are"
+        )
+
+    @property
     def off_mm(self) -> float:
         """What a trace may be off by that, if it is told; else 0."""
         return OF_A_TRACE * abs(self.voxels) * self.voxel_mm * self.told
 
 
-def wider(s: StaticPoints, last: Solved, brighter: float, *, taken: bool = False) -> Wider:
-    """The wall's residual, on all sides alike. last, taken : as for ``bent``.
+def wider(s: StaticPoints, left: Left, brighter: float) -> Wider:
+    """The wall's residual, on all sides alike. left : by the rigid fit.
 
     brighter : 1 for a vessel that is brighter than what is around it, -1 for a darker one.
     """
-    count = len(s.grey)
-    if len(s.starts) < 2 or np.mean(last.clear) < MOST_METAL:  # beside so much metal its skirts are what is left
+    if len(s.starts) < 2:
         return Wider()
-    gain, grey = gain_at(s, last), last.rest if taken else last.rest + last.change
+    gain, grey, clear = left
     outward = brighter * s.voxel_mm * gain * np.linalg.norm(s.gradient, axis=1)
-    clear = clear_of_metal(s, last, gain)
-    rows, weights = np.column_stack([outward, np.ones(count), s.centred, grey]), clear.astype(float)
+    rows, weights = np.column_stack([outward, np.ones(len(grey)), s.centred, grey]), clear.astype(float)
     for _ in range(ROUNDS):
         power, right, shade = shaded(products(rows, weights, s.starts))
         found = float(right.sum() / (power.sum() + TINY))
@@ -73,5 +86,4 @@ def _sd(power: Array, right: Array) -> float:
     shown = power > max(SEEN * float(np.median(power)), TINY)
     if np.count_nonzero(shown) < 2:
         return float("inf")
-    each = right[shown] / power[shown]
-    return MAD * float(np.median(np.abs(each - np.median(each)))) / float(np.sqrt(len(each)))
+    return spread(right[shown] / power[shown]) / float(np.sqrt(np.count_nonzero(shown)))
