@@ -61,19 +61,36 @@ BAD_MISFIT_VOXELS = 0.6
 
 @dataclass(frozen=True, eq=False)
 class Anchor:
-    """What frames are registered to: the reference scan without its padding, and points of its lumen's wall.
-
-    brighter : 1 where the vessel is brighter than what is around it, -1 where it is darker.  roomy : whether a
-    wire leaves it a wall to be seen.  shell : what it shows beside the vessel.
+    """What frames are registered to: the reference scan without its padding, its lumen's signed distance, and points of
+    that wall.
     """
 
     reference: Volume
     wall: StaticPoints
     patch_mm: float
     padding: Padding | None
-    brighter: float
-    roomy: bool
-    shell: Shell
+    distance: Grid
+
+    @cached_property
+    def depth(self) -> Array:
+        """Signed distance (n,) of the wall's points."""
+        index = np.rint(self.distance.to_index(self.wall.points_mm)).astype(np.intp)
+        return np.asarray(self.distance.values[tuple(index.T)], np.float64)
+
+    @cached_property
+    def brighter(self) -> float:
+        """1 where the vessel is brighter than what is around it, -1 where it is darker."""
+        return -1.0 if self.wall.centred @ self.depth > 0.0 else 1.0
+
+    @cached_property
+    def roomy(self) -> bool:
+        """Whether a wire leaves the vessel a wall to be seen."""
+        return bool(np.count_nonzero(self.depth < 0.0) > ROOMY * np.count_nonzero(self.depth > 0.0))
+
+    @cached_property
+    def shell(self) -> Shell:
+        """What the reference shows beside the vessel; frames that are only asked whether they moved need none."""
+        return shell_of(self.reference, self.distance)
 
     @cached_property
     def contrast(self) -> float:
@@ -200,10 +217,7 @@ def anchor(reference: Volume, lumen: Lumen) -> Anchor:
     band = (distance.values < reach) & (distance.values > -reach)  # without a second box of numbers
     patch_mm = max(LEAST_MM, -SPAN_RADII * float(distance.values.min()))
     wall = static_points(reference, _thinned(distance, band, POINTS), patch_mm)
-    deep = distance.values[tuple(np.rint(distance.to_index(wall.points_mm)).astype(np.intp).T)]
-    brighter = -1.0 if len(deep) and wall.centred @ deep > 0.0 else 1.0
-    roomy = bool(np.count_nonzero(deep < 0.0) > ROOMY * np.count_nonzero(deep > 0.0))
-    return Anchor(reference, wall, patch_mm, padding, brighter, roomy, shell_of(reference, distance))
+    return Anchor(reference, wall, patch_mm, padding, distance)
 
 
 def _best(frame: Volume, to: Anchor) -> Motion:

@@ -88,9 +88,10 @@ def shell_of(reference: Volume, distance: Grid) -> Shell:
     points = distance.to_mm(index)
     grey, inside = _grey(reference, points)
     points, grey = points[inside], grey[inside]
-    _, cell, count = np.unique(index[inside] // size, axis=0, return_inverse=True, return_counts=True)
-    held = count[cell.ravel()] >= FULL * np.prod(size)
-    _, cell = np.unique(cell.ravel()[held], return_inverse=True)
+    cells = np.ravel_multi_index(tuple((index[inside] // size).T), distance.shape)
+    _, cell, count = np.unique(cells, return_inverse=True, return_counts=True)
+    held = count[cell] >= FULL * np.prod(size)
+    _, cell = np.unique(cell[held], return_inverse=True)
     centres = np.stack([_means(cell, along) for along in points[held].T], axis=1)
     return Shell(points[held], cell, centres, float(np.max(size * distance.spacing_mm)), _means(cell, grey[held]))
 
