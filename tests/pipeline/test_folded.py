@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.segment import segment
 from pipeline.status import FrameStatus
-from pipeline.trace import trace
 from tests.studies.seeing import render
 from tests.studies.seeing.scenes import Draft, Scene, sideways
+from tests.studies.seeing.table import seen
 
 VOXEL = 0.4
 
@@ -29,8 +28,6 @@ def folded(seed: int, length_mm: float, beside_mm: float) -> Scene:
     ("seed", "length_mm", "beside_mm"), [(0, 2.0, 0.65), (1, 2.0, 0.65), (2, 2.0, 0.75), (1, 3.0, 0.65)]
 )
 def test_a_tip_beside_the_wire_is_not_left_out_in_silence(seed: int, length_mm: float, beside_mm: float) -> None:
-    scene = folded(seed, length_mm, beside_mm)
-    lumen = segment(scene.reference, scene.entry[None])
-    curve = trace(scene.frame, lumen, scene.entry, scene.direction, reference=scene.reference)
+    _, curve = seen(folded(seed, length_mm, beside_mm))
     assert curve.status is FrameStatus.TRACE_AMBIGUOUS
     assert "out of round" in curve.note

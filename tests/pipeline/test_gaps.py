@@ -13,15 +13,15 @@ from pipeline.run.stages.gaps import own_gaps
 from pipeline.run.stages.known import Frame
 from pipeline.run.stages.repeated import once
 from pipeline.run.stages.thickness import not_too_thick
-from pipeline.segment import segment
 from pipeline.status import FrameStatus
-from pipeline.trace import BEYOND_GAP, GAP, of_catheter, trace
+from pipeline.trace import BEYOND_GAP, GAP, of_catheter
 from pipeline.trace.whose_end import first_gap_mm
 from solver.grid import Grid
 from tests.later import later
 from tests.pipeline.doubts import frames, with_gap
 from tests.studies.seeing.render import arc_of
 from tests.studies.seeing.scenes import Draft
+from tests.studies.seeing.table import seen
 
 NAN = float("nan")
 
@@ -38,13 +38,10 @@ def facing(gap_mm: float):
 @pytest.mark.parametrize("gap_mm", [1.2, *later(2.5)])
 def test_a_device_that_faces_the_tip_is_not_taken_for_the_wire_unless_the_depth_says_so(gap_mm):
     scene = facing(gap_mm)
-    lumen = segment(scene.reference, scene.entry[None])
-    curve = trace(scene.frame, lumen, scene.entry, scene.direction, reference=scene.reference)
+    _, curve = seen(scene)
     assert curve.status is FrameStatus.TRACE_AMBIGUOUS, f"{curve.length_mm:.1f} of {arc_of(scene.wire)[-1]:.1f} mm, ok"
     assert "second device faces the wire's tip" in curve.note
-    whole = trace(
-        scene.frame, lumen, scene.entry, scene.direction, reference=scene.reference, expected_mm=curve.length_mm
-    )
+    _, whole = seen(scene, expected_mm=curve.length_mm)
     assert whole.status is FrameStatus.OK, "the same picture: the wire has a gap, says the stated depth"
 
 

@@ -74,8 +74,7 @@ def test_a_marker_at_the_tip_is_seen_in_noise_beyond_what_is_not(seed: int, cnr:
     draft = Draft(np.random.default_rng(seed), spacing=0.4, radius=2.0)
     draft.opacity = np.where((draft.from_tip > 1.0) & (draft.from_tip < 8.0), 0.03, 1.0)
     scene = draft.scan(cnr)
-    lumen = segment(scene.reference, scene.entry[None])
-    curve = trace(scene.frame, lumen, scene.entry, scene.direction, reference=scene.reference)
+    _, curve = seen(scene)
     assert curve.status is FrameStatus.TRACE_AMBIGUOUS
     right = abs(curve.length_mm - arc_of(scene.wire)[-1]) < 1.0
     assert ("beyond a gap" if right else "beyond") in curve.note
@@ -166,11 +165,7 @@ def test_two_wires_turned_about_each_other_are_not_one(voxels, pitch_mm):
     phase = 2.0 * np.pi * arc_of(draft.path)[:, None] / pitch_mm
     other = draft.path + 0.3 * voxels * (np.cos(phase) * one + np.sin(phase) * two)
     draft.others = [(other, 0.18, 1.0)]
-    scene = draft.scan(10)
-    curve = trace(
-        scene.frame, segment(scene.reference, scene.entry[None]), scene.entry, scene.direction,
-        reference=scene.reference,
-    )  # fmt: skip
+    _, curve = seen(draft.scan(10))
     assert curve.status is FrameStatus.TRACE_AMBIGUOUS
     assert "out of round over" in curve.note or "one strand" in curve.note
 
@@ -184,11 +179,7 @@ def test_a_second_wire_that_is_a_copy_moved_aside_is_seen_in_part(seed):
     aside = rng.normal(size=3)
     aside *= rng.uniform(1.0, 2.6) * 0.3 / np.linalg.norm(aside)
     draft.others.append((draft.path + aside, wire_radius, 1.0))
-    scene = draft.scan((8, 16)[seed % 2])
-    curve = trace(
-        scene.frame, segment(scene.reference, scene.entry[None]), scene.entry, scene.direction,
-        reference=scene.reference,
-    )  # fmt: skip
+    _, curve = seen(draft.scan((8, 16)[seed % 2]))
     assert curve.status is FrameStatus.TRACE_AMBIGUOUS
     assert "out of round over 10 mm" in curve.note
 
@@ -236,18 +227,14 @@ def leaving(seed, leaves_mm, angle_deg):
 def test_a_wire_that_leaves_the_lumen_through_its_wall_is_not_cut_there(leaves_mm, angle_deg):
     """Cut where grey is no longer read, four voxels outside: ok, 2 to 27 voxels short, a tip known to 0.04 mm."""
     for seed in (20, 21):
-        scene = leaving(seed, leaves_mm, angle_deg).scan(16)
-        lumen = segment(scene.reference, scene.entry[None])
-        curve = trace(scene.frame, lumen, scene.entry, scene.direction, reference=scene.reference)
+        _, curve = seen(leaving(seed, leaves_mm, angle_deg).scan(16))
         assert curve.status is FrameStatus.TRACE_LEFT_LUMEN
 
 
 @pytest.mark.parametrize("seed", [0, *later(1)])
 def test_a_wire_that_leaves_the_lumen_is_no_thin_vessel_of_a_frame_without_reference(seed):
     """In tissue it is as bright as contrast medium, and counted as lumen: cut where it leaves, 4 mm short, and ok."""
-    scene = leaving(seed, 3.0, 80.0).scan(16, reference=False)
-    lumen = segment(scene.frame, scene.entry[None], wire_radius_mm=scene.wire_radius)
-    curve = trace(scene.frame, lumen, scene.entry, scene.direction)
+    _, curve = seen(leaving(seed, 3.0, 80.0).scan(16, reference=False))
     assert curve.status is FrameStatus.TRACE_LEFT_LUMEN
     assert "leads on through tissue" in curve.note
 
@@ -260,8 +247,7 @@ def test_a_tip_in_medium_that_is_washed_out_is_not_seen(seed, thinner, about_mm)
     away = np.linalg.norm(scene.frame.to_mm(np.argwhere(np.ones(scene.frame.shape))) - scene.wire[-1], axis=1)
     medium = (scene.reference.values - 100.0) * expit((about_mm - away) / 0.3).reshape(scene.frame.shape)
     frame = replace(scene.frame, values=(scene.frame.values - thinner * medium).astype(np.float32))
-    lumen = segment(scene.reference, scene.entry[None])
-    curve = trace(frame, lumen, scene.entry, scene.direction, reference=scene.reference)
+    _, curve = seen(replace(scene, frame=frame))
     assert (curve.status is FrameStatus.OK) == (thinner == 0.0), curve.note
     if thinner == 0.6:
         assert "contrast medium about the curve's end that is darker than the reference's" in curve.note
@@ -275,7 +261,7 @@ def test_scans_in_coarse_steps_of_grey_are_no_copies(step):
     frame, reference = (
         replace(v, values=(np.rint(v.values / size) * size).astype(np.int16)) for v in (scene.frame, scene.reference)
     )
-    curve = trace(frame, segment(reference, scene.entry[None]), scene.entry, scene.direction, reference=reference)
+    _, curve = seen(replace(scene, frame=frame, reference=reference))
     assert "to the last bit" not in curve.note
 
 
@@ -286,7 +272,7 @@ def test_scans_whose_negative_grey_is_cut_off_at_0_are_no_copies(seed, lower):
     frame, reference = (
         replace(v, values=np.maximum(v.values - np.int16(lower), 0)) for v in (scene.frame, scene.reference)
     )
-    curve = trace(frame, segment(reference, scene.entry[None]), scene.entry, scene.direction, reference=reference)
+    _, curve = seen(replace(scene, frame=frame, reference=reference))
     assert curve.status is FrameStatus.OK, curve.note
     assert curve.levels["gain"] == 1.0
 
@@ -302,12 +288,9 @@ def test_a_frame_of_which_a_part_is_the_reference_is_no_scan_of_the_wire(seed):
     first = int(scene.frame.to_index(middle[None])[0][axis])
     part = [slice(None)] * 3
     part[axis] = slice(first, None) if towards[axis] > 0 else slice(None, first)
-    lumen = segment(scene.reference, scene.entry[None])
     if seed != 2:
         values[tuple(part)] = scene.reference.values[tuple(part)]
-    curve = trace(
-        replace(scene.frame, values=values), lumen, scene.entry, scene.direction, reference=scene.reference
-    )  # fmt: skip
+    _, curve = seen(replace(scene, frame=replace(scene.frame, values=values)))
     assert (curve.status is FrameStatus.OK) == (seed == 2)
     assert ("of the lumen's voxels as the reference has them, to the last bit" in curve.note) == (seed != 2)
 
@@ -328,11 +311,17 @@ def test_grey_that_is_counted_from_elsewhere_costs_no_wire(noises):
 
 
 def narrow(seed, gain):
-    """A wire through most of a vessel that is so narrow that the blurred wire reaches all of it, and its lumen."""
+    """A wire through most of a vessel that is so narrow that the blurred wire reaches all of it."""
     draft = Draft(np.random.default_rng(seed), radius=0.8, wire_radius=0.18, room=0.1)
     draft.gain = gain
-    scene = draft.scan(8)
-    return scene, segment(scene.reference, scene.entry[None])
+    return draft.scan(8)
+
+
+def fitted_in(scene):
+    """A scene as tracing sees it, and what explains it best."""
+    image = subtracted(scene.frame, segment(scene.reference, scene.entry[None]), scene.reference)
+    entry = EntryPose(image.local(scene.entry[None])[0], image.turned(scene.direction))
+    return image, explain.best_of(image, entry, None, TraceConfig())
 
 
 @pytest.mark.parametrize("seed", [30, 32])
@@ -340,9 +329,7 @@ def test_a_wire_in_a_narrow_vessel_is_no_more_contrast(seed):
     """It was 2 and 4 % more, of a vessel that it nearly fills, and a faint end of 8 mm was taken off with that."""
     draft = Draft(np.random.default_rng([seed, 77]), length=60.0, radius=0.6, wire_radius=0.2, room=0.05)
     draft.opacity = np.where(draft.from_tip < 8.0, 0.1, 1.0)
-    scene = draft.scan(30)
-    lumen = segment(scene.reference, scene.entry[None])
-    curve = trace(scene.frame, lumen, scene.entry, scene.direction, reference=scene.reference)
+    _, curve = seen(draft.scan(30))
     assert curve.levels["gain"] == 1.0
     assert curve.status is FrameStatus.TRACE_AMBIGUOUS
 
@@ -351,17 +338,13 @@ def test_a_wire_in_a_narrow_vessel_is_no_more_contrast(seed):
 @pytest.mark.parametrize("seed", [4, *later(6)])
 def test_the_wire_is_not_taken_for_contrast_medium(seed, gain):
     """0.11 to 0.14 off by the median of a lumen of which the wire brightens more than half."""
-    scene, lumen = narrow(seed, gain)
-    curve = trace(scene.frame, lumen, scene.entry, scene.direction, reference=scene.reference)
+    _, curve = seen(narrow(seed, gain))
     assert abs(curve.levels["gain"] - gain) < 0.09
     assert curve.status.name == "OK", curve.note
 
 
 def test_a_wire_of_no_brightness_is_refused_and_not_divided_by():
-    scene, lumen = narrow(4, 1.0)
-    image = subtracted(scene.frame, lumen, scene.reference)
-    entry = EntryPose(image.local(scene.entry[None])[0], image.turned(scene.direction))
-    best = explain.best_of(image, entry, None, TraceConfig())
+    image, best = fitted_in(narrow(4, 1.0))
     dark = replace(best.attempt, tube=replace(best.attempt.tube, tint=0.0 * best.attempt.tube.tint))
     verdict = judge(image, dark, best.points, np.zeros(len(best.points), bool), best.length_mm)
     assert verdict.status.name == "TRACE_LOW_CONTRAST"
@@ -369,10 +352,7 @@ def test_a_wire_of_no_brightness_is_refused_and_not_divided_by():
 
 def test_a_sharp_line_in_a_halo_is_a_wire_that_moved():
     """Half of the scan 1.6 voxels aside: the line lay at neither place, 0.2 mm off one at a sigma of 0.015, and ok."""
-    scene, lumen = narrow(4, 1.0)
-    image = subtracted(scene.frame, lumen, scene.reference)
-    entry = EntryPose(image.local(scene.entry[None])[0], image.turned(scene.direction))
-    best = explain.best_of(image, entry, None, TraceConfig())
+    image, best = fitted_in(narrow(4, 1.0))
 
     def judged(blur, halo):
         tube = best.attempt.tube
@@ -394,8 +374,7 @@ def test_a_faint_end_in_a_sharp_scan_is_not_dropped_in_silence(level, status):
     draft.lattice = Lattice.around(draft.axis, 4.5, 0.5, rng, 0.5)
     draft.opacity = np.where(draft.from_tip < 6.0, level, 1.0)
     scene = draft.scan(16)
-    lumen = segment(scene.reference, scene.entry[None])
-    curve = trace(scene.frame, lumen, scene.entry, scene.direction, reference=scene.reference)
+    _, curve = seen(scene)
     assert curve.status.name == status, f"{curve.length_mm:.1f} of {arc_of(scene.wire)[-1]:.1f} mm; {curve.note}"
 
 

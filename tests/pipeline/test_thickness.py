@@ -12,10 +12,10 @@ from pipeline.run.stages.known import Frame
 from pipeline.run.stages.thickness import not_too_thick, too_thin
 from pipeline.segment import BLUR_UNSURE, segment
 from pipeline.status import FrameStatus
-from pipeline.trace import trace
 from solver.grid import Grid
 from tests.later import later
 from tests.studies.seeing.scenes import Draft
+from tests.studies.seeing.table import seen
 
 BLUR_MM = 0.23
 
@@ -83,8 +83,7 @@ def test_a_rod_is_no_wire_of_a_third_of_its_radius(seed: int) -> None:
     rng = np.random.default_rng([seed, 9])
     radius_mm = float(rng.uniform(0.48, 0.6))
     scene = Draft(rng, radius=rng.uniform(1.6, 2.2), wire_radius=radius_mm).scan((8, 16)[seed % 2])
-    vessel = segment(scene.reference, scene.entry[None])
-    curve = trace(scene.frame, vessel, scene.entry, scene.direction, reference=scene.reference)
+    vessel, curve = seen(scene)
     assert curve.status is FrameStatus.OK
     assert not_too_thick(curve, vessel, radius_mm) is curve
     refused = not_too_thick(curve, vessel, 0.18)
