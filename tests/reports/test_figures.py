@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -50,6 +51,13 @@ def _empty_case(folder: Path, **changes: Any) -> CaseFiles:
     return CaseFiles(**{**fields, **changes})
 
 
+def draw(figure: Callable[[Any], Drawing | None], data: Any) -> Drawing:
+    """What a figure's function draws of data that it has something to draw of."""
+    drawing = figure(data)
+    assert drawing is not None
+    return drawing
+
+
 @pytest.mark.parametrize("name", CASE_FIGURES)
 def test_no_data_is_no_figure(name: str, tmp_path: Path) -> None:
     assert CASE_FIGURES[name](_empty_case(tmp_path)) is None
@@ -69,7 +77,7 @@ def test_an_empty_run_has_no_figure(name: str) -> None:
 def test_very_short_insertions_are_drawn(count: int, tmp_path: Path) -> None:
     out = write_run(tmp_path / "out", (FakeCase("c", frames=count, truth=True), FakeCase("d", frames=count)))
     case = read_case(out / "cases" / "c")
-    drawn = [name for name, draw in CASE_FIGURES.items() if draw(case) is not None]
+    drawn = [name for name, figure in CASE_FIGURES.items() if figure(case) is not None]
     absent = {
         "scan_at_entry",
         "failed_projections",
@@ -95,6 +103,18 @@ def _heat_case(tmp_path: Path) -> CaseFiles:
     return _empty_case(tmp_path, samples=tables.read(tmp_path / "points.csv.gz", POINTS))
 
 
+def swept(folder: Path, rows: list[dict[str, Any]]) -> Drawing:
+    """What is drawn of these rows of sweep.csv."""
+    tables.write(folder / "sweep.csv", SWEEP, rows)
+    sweep = tables.read(folder / "sweep.csv", SWEEP)
+    return draw(RUN_FIGURES["sensitivity"], RunFiles({}, tables.read_if_there(None, SUMMARY), sweep))
+
+
+def lines_of(drawing: Drawing) -> dict[str, Any]:
+    """The lines of a figure's first axes, by their labels."""
+    return {str(line.get_label()): line for line in drawing.figure.axes[0].get_lines()}
+
+
 def test_the_unchanged_value_is_a_point_of_the_curve(tmp_path: Path) -> None:
     """Two changed values that are equally bad were a flat line: what lies between them was not drawn."""
     rows = [{"parameter": "(plain)", "value": "", "case": c, "rms_mm": 0.1} for c in ("a", "b", "(all)")]
@@ -102,11 +122,7 @@ def test_the_unchanged_value_is_a_point_of_the_curve(tmp_path: Path) -> None:
         changed = {"parameter": "simulate.roll_offset_deg", "value": value, "unchanged": "0"}
         rows += [{**changed, "case": c, "rms_mm": 0.25} for c in ("a", "b")]
         rows.append({**changed, "case": "(all)", "rms_mm": 0.25, "rms_ratio_low": 2.0, "rms_ratio_high": 3.0})
-    tables.write(tmp_path / "sweep.csv", SWEEP, rows)
-    sweep = tables.read(tmp_path / "sweep.csv", SWEEP)
-    drawing = RUN_FIGURES["sensitivity"](RunFiles({}, tables.read_if_there(None, SUMMARY), sweep))
-    assert drawing is not None
-    lines = {str(line.get_label()): line for line in drawing.figure.axes[0].get_lines()}
+    lines = lines_of(swept(tmp_path, rows))
     assert lines["to the traced wire"].get_xydata().tolist() == [[-15.0, 0.25], [0.0, 0.1], [15.0, 0.25]]
     assert lines["unchanged"].get_xydata().tolist() == [[0.0, 0.1]]
 
@@ -118,11 +134,7 @@ def test_the_unchanged_value_has_its_ring_where_it_was_asked_for_too(tmp_path: P
         {"parameter": "simulate.taper_scale", "value": value, "unchanged": "1", "case": "a", "rms_mm": rms}
         for value, rms in (("0.5", 0.2), ("1", 0.1), ("2", 0.3))
     ]
-    tables.write(tmp_path / "sweep.csv", SWEEP, rows)
-    sweep = tables.read(tmp_path / "sweep.csv", SWEEP)
-    drawing = RUN_FIGURES["sensitivity"](RunFiles({}, tables.read_if_there(None, SUMMARY), sweep))
-    assert drawing is not None
-    lines = {str(line.get_label()): line for line in drawing.figure.axes[0].get_lines()}
+    lines = lines_of(swept(tmp_path, rows))
     assert lines["to the traced wire"].get_xydata().tolist() == [[0.5, 0.2], [1.0, 0.1], [2.0, 0.3]]
     assert lines["unchanged"].get_xydata().tolist() == [[1.0, 0.1]]
 
@@ -134,10 +146,7 @@ def test_no_case_of_a_sweep_is_cut_off_and_an_interval_that_goes_on_says_so(tmp_
         changed = {"parameter": "simulate.roll_offset_deg", "value": value, "unchanged": "0"}
         rows += [{**changed, "case": "a", "rms_mm": 0.1}, {**changed, "case": "b", "rms_mm": 3.0}]
         rows.append({**changed, "case": "(all)", "rms_mm": 0.25, "rms_ratio_low": 1.5, "rms_ratio_high": high})
-    tables.write(tmp_path / "sweep.csv", SWEEP, rows)
-    sweep = tables.read(tmp_path / "sweep.csv", SWEEP)
-    drawing = RUN_FIGURES["sensitivity"](RunFiles({}, tables.read_if_there(None, SUMMARY), sweep))
-    assert drawing is not None
+    drawing = swept(tmp_path, rows)
     axes = drawing.figure.axes[0]
     top = axes.get_ylim()[1]
     assert top > 3.0
@@ -160,8 +169,7 @@ def test_a_skill_below_minus_one_is_drawn(tmp_path: Path) -> None:
     errors = tables.read(path, ERRORS)
     for values in ([-38.6, -2.0, 0.5], [-0.9, 0.1, 0.5], [-1.2, -1.1, -1.05]):
         tables.write(path, ERRORS, errors.assign(skill=values, skill_strongest=np.nan))
-        drawing = CASE_FIGURES["skill_by_depth"](read_case(path.parent))
-        assert drawing is not None
+        drawing = draw(CASE_FIGURES["skill_by_depth"], read_case(path.parent))
         left = drawing.figure.axes[0]
         low, high = left.get_ylim()
         assert low < min(values)
@@ -182,8 +190,7 @@ def test_no_force_is_another_colour_than_a_little_one(tmp_path: Path) -> None:
     case = _heat_case(tmp_path)
     assert case.samples is not None
     size = np.where(case.samples["arc_mm"] < 2.0, 0.0, 1e-4)
-    drawing = CASE_FIGURES["contact_along_wire"](replace(case, samples=case.samples.assign(contact_force_N=size)))
-    assert drawing is not None
+    drawing = draw(CASE_FIGURES["contact_along_wire"], replace(case, samples=case.samples.assign(contact_force_N=size)))
     forces, none = (np.ma.masked_invalid(mesh.get_array()) for mesh in drawing.figure.axes[0].collections)
     assert forces.min() > 0.0
     assert none.count() > 0
@@ -196,15 +203,13 @@ def test_a_table_of_forces_tells_refused_frames_from_others(tmp_path: Path) -> N
     assert case.samples is not None
     errors = pd.DataFrame({"frame": [0, 2], "status": ["ok", "no_wire"]})
     forces = case.samples.assign(contact_force_N=1.0)
-    drawing = CASE_FIGURES["contact_along_wire"](replace(case, samples=forces, errors=errors))
-    assert drawing is not None
+    drawing = draw(CASE_FIGURES["contact_along_wire"], replace(case, samples=forces, errors=errors))
     told = {*zip(drawing.table["frame"], drawing.table["status"], strict=True)}
     assert told == {(0, "ok"), (2, "no_wire")}
 
 
 def test_heat_map_shows_each_sample_at_its_place(tmp_path: Path) -> None:
-    drawing = CASE_FIGURES["error_along_wire"](_heat_case(tmp_path))
-    assert drawing is not None
+    drawing = draw(CASE_FIGURES["error_along_wire"], _heat_case(tmp_path))
     shown = drawing.table
     np.testing.assert_allclose(shown["error_mm"], shown["arc_mm"] / 10, rtol=0.0, atol=0.5 / 10 / 2 + 1e-9)
     assert shown["frame"].unique().tolist() == [0, 2], "the frame without points stays empty"
@@ -243,8 +248,7 @@ def test_where_no_lumen_was_found_the_scan_is_shown_at_the_entry(tmp_path: Path)
     for x in (5.0, 40.0):
         entry = {"entry_mm": [x, 6.0, 0.0], "entry_direction": [0.0, 0.0, 2.0]}
         read = read_scan(tmp_path / "frames.h5")
-        drawing = CASE_FIGURES["scan_at_entry"](_empty_case(tmp_path, scan=read, result={"entry": entry}))
-        assert drawing is not None
+        drawing = draw(CASE_FIGURES["scan_at_entry"], _empty_case(tmp_path, scan=read, result={"entry": entry}))
         assert drawing.table.iloc[0][["x_mm", "y_mm", "z_mm"]].tolist() == [x, 6.0, 0.0]
         front = drawing.figure.axes[0]
         assert front.get_xlim()[0] < x < front.get_xlim()[1]
@@ -254,8 +258,7 @@ def test_where_no_lumen_was_found_the_scan_is_shown_at_the_entry(tmp_path: Path)
 
 def test_one_scored_frame_shows_its_predictors(tmp_path: Path) -> None:
     case = read_case(write_run(tmp_path, [FakeCase("one", frames=1)]) / "cases" / "one")
-    drawing = CASE_FIGURES["error_by_depth"](case)
-    assert drawing is not None
+    drawing = draw(CASE_FIGURES["error_by_depth"], case)
     lines = drawing.figure.axes[0].get_lines()
     assert len(lines) > 3
     assert all(line.get_marker() not in ("", "None", None) for line in lines)
@@ -268,16 +271,16 @@ def test_the_cells_of_few_frames_have_their_numbers(tmp_path: Path) -> None:
         errors = read_case(out / "cases" / "c").errors
         errors.loc[:2, "p95_mm"] = [0.27, 1.256, 12.3]
         summary = tables.read(out / "summary.csv", SUMMARY)
-        drawing = RUN_FIGURES["case_frame_map"](RunFiles({"c": errors}, summary, tables.read_if_there(None, SWEEP)))
-        assert drawing is not None
+        drawing = draw(
+            RUN_FIGURES["case_frame_map"], RunFiles({"c": errors}, summary, tables.read_if_there(None, SWEEP))
+        )
         assert [text.get_text() for text in drawing.figure.axes[0].texts] == numbers
 
 
 def test_the_clamps_reach_is_grey_as_it_is_not_scored(tmp_path: Path) -> None:
     case = _heat_case(tmp_path)
     case = replace(case, samples=case.points[case.points["arc_mm"] >= 2.0])
-    drawing = CASE_FIGURES["error_along_wire"](case)
-    assert drawing is not None
+    drawing = draw(CASE_FIGURES["error_along_wire"], case)
     assert drawing.table["arc_mm"].min() == pytest.approx(2.0, abs=0.25)
     grey = [bar.get_width() for bar in drawing.figure.axes[0].patches]
     assert grey == pytest.approx([2.0, 0.0, 2.0], abs=0.25), "what was white in front could as well be beyond a tip"
@@ -332,8 +335,7 @@ def test_a_case_stands_beside_the_predictor_that_came_nearest() -> None:
     row = {"role": "validation", "rms_mm": 0.2, "null_centreline_rms_mm": 1.3, "null_previous_rms_mm": 0.3}
     cases = [{"case": "a", **row, "strongest_null": "previous"}, {"case": "b", **row}]
     summary = pd.DataFrame(cases).reindex(columns=SUMMARY.names)
-    drawing = RUN_FIGURES["cases_by_error"](RunFiles({}, summary, tables.read_if_there(None, SWEEP)))
-    assert drawing is not None
+    drawing = draw(RUN_FIGURES["cases_by_error"], RunFiles({}, summary, tables.read_if_there(None, SWEEP)))
     np.testing.assert_array_equal(drawing.table["strongest_rms_mm"], [0.3, np.nan])
     (marks,) = [line for line in drawing.figure.axes[0].lines if line.get_label() == "its strongest predictor"]
     np.testing.assert_array_equal(marks.get_xdata(), [0.3, np.nan])
@@ -357,8 +359,7 @@ def test_lines_of_simulators_that_coincide_are_all_seen() -> None:
         for name in ("a", "b", "c")
         for low in (0.0, 5.0)
     ]
-    drawing = who_is_nearest(SimulatorFiles(pd.DataFrame(), pd.DataFrame(rows)))
-    assert drawing is not None
+    drawing = draw(who_is_nearest, SimulatorFiles(pd.DataFrame(), pd.DataFrame(rows)))
     lines = drawing.figure.axes[0].lines
     assert len({line.get_marker() for line in lines}) == 3
     for looks in (line.get_linewidth() for line in lines), (line.get_markersize() for line in lines):
@@ -369,8 +370,7 @@ def test_lines_of_simulators_that_coincide_are_all_seen() -> None:
 def test_u_val_has_one_colour(tmp_path: Path) -> None:
     """Its bar had the traced wire's, its line over the depth another."""
     tables.write(tmp_path / "budget.csv", BUDGET, [{"source": "u_val", "u_mm": 0.2, "distal_u_mm": 0.3}])
-    drawing = CASE_FIGURES["budget"](_empty_case(tmp_path))
-    assert drawing is not None
+    drawing = draw(CASE_FIGURES["budget"], _empty_case(tmp_path))
     (line,) = [look for column, _, look in lines("error_by_depth") if column == "u_val_mm"]
     assert drawing.figure.axes[0].patches[0].get_facecolor() == to_rgba(line["color"])
 
@@ -379,15 +379,13 @@ def test_a_budget_is_drawn_by_source_and_by_entry(tmp_path: Path) -> None:
     rows = [{"source": n, "sigma": "", "u_mm": u, "distal_u_mm": 2 * u} for n, u in (("roll", 0.1), ("error", 0.2))]
     tables.write(tmp_path / "budget.csv", BUDGET, rows)
     case = _empty_case(tmp_path)
-    drawing = CASE_FIGURES["budget"](case)
-    assert drawing is not None
+    drawing = draw(CASE_FIGURES["budget"], case)
     (left,) = drawing.figure.axes
     assert [bar.get_width() for bar in left.patches] == [0.1, 0.2, 0.2, 0.4]
     assert [text.get_text() for text in left.get_legend().get_texts()] == ["whole wire", "last 10 mm"]
     entry = {"clamp": "estimated", "depth": "traced", "frames": 3, "rms_mm": 0.1, "distal10_rms_mm": 0.2}
     tables.write(tmp_path / "entries.csv", ENTRIES, [entry | {"tip_median_mm": 0.3}])
-    both = CASE_FIGURES["budget"](case)
-    assert both is not None
+    both = draw(CASE_FIGURES["budget"], case)
     assert len(both.figure.axes) == 2
     handed_in = replace(case, result={"inputs": [{"key": "simulated.files[0]", "path": "a.csv", "sha256": ""}]})
     assert CASE_FIGURES["budget"](handed_in) is None, "it is of our solver's wire"
@@ -397,8 +395,7 @@ def test_marks_at_the_end_of_four_entries_are_whole(tmp_path: Path) -> None:
     """Four like distances far from 0 had a margin of a twentieth of their range: squares were cut by the frame."""
     far = dict.fromkeys(("rms_mm", "distal10_rms_mm", "tip_median_mm"), 0.15)
     tables.write(tmp_path / "entries.csv", ENTRIES, [{"clamp": "manifest", "depth": "traced"} | far])
-    drawing = CASE_FIGURES["budget"](_empty_case(tmp_path))
-    assert drawing is not None
+    drawing = draw(CASE_FIGURES["budget"], _empty_case(tmp_path))
     assert drawing.figure.axes[0].get_xlim() == pytest.approx((0.0, 0.165))
 
 
@@ -407,8 +404,7 @@ def test_only_what_was_computed_of_a_budget_is_drawn(tmp_path: Path) -> None:
     rows: list[dict[str, Any]] = [{"source": name, "sigma": ""} for name in ("clamp", "roll")]
     rows += [{"source": n, "sigma": "", "u_mm": 0.1, "distal_u_mm": 0.2} for n in ("inputs", "u_val", "error")]
     tables.write(tmp_path / "budget.csv", BUDGET, rows)
-    drawing = CASE_FIGURES["budget"](_empty_case(tmp_path))
-    assert drawing is not None
+    drawing = draw(CASE_FIGURES["budget"], _empty_case(tmp_path))
     (axes,) = drawing.figure.axes
     assert [text.get_text() for text in axes.get_yticklabels()] == ["inputs", "all: u val", "error"]
     assert axes.get_ylim() == (2.5, -0.5)
@@ -445,8 +441,9 @@ def test_a_source_that_is_larger_than_all_of_them_is_explained(
 def test_release_frames_show_both_probabilities(tmp_path: Path) -> None:
     errors = {"frame": [0, 1], "status": ["ok", "ok"], "insertion_mm": [5.0, 9.0], "release": [np.nan, 0.7]}
     tables.write(tmp_path / "errors.csv", ERRORS, pd.DataFrame(errors | {"release_real": [np.nan, 0.3]}))
-    drawing = CASE_FIGURES["release_frames"](_empty_case(tmp_path, errors=tables.read(tmp_path / "errors.csv", ERRORS)))
-    assert drawing is not None
+    drawing = draw(
+        CASE_FIGURES["release_frames"], _empty_case(tmp_path, errors=tables.read(tmp_path / "errors.csv", ERRORS))
+    )
     assert drawing.table["frame"].tolist() == [1]
     lines = drawing.figure.axes[0].get_lines()
     assert [list(line.get_ydata()) for line in lines] == [[0.7], [0.3]]
@@ -473,10 +470,7 @@ def test_projections_choose_first_middle_last_and_worst(tmp_path: Path) -> None:
     errors.loc[errors["frame"] == 3, "p95_mm"] = 99.0
     tables.write(path, ERRORS, errors)
     case = read_case(path.parent)
-    drawing = CASE_FIGURES["projections"](case)
-    failed = CASE_FIGURES["failed_projections"](case)
-    assert drawing is not None
-    assert failed is not None
+    drawing, failed = (draw(CASE_FIGURES[name], case) for name in ("projections", "failed_projections"))
     titles = [axes.get_title(loc="left") for axes in drawing.figure.axes]
     assert [t for t in titles if "frame" in t] == [
         "frame 1 (first)",
@@ -489,9 +483,8 @@ def test_projections_choose_first_middle_last_and_worst(tmp_path: Path) -> None:
 
 def test_failed_frames_are_marked_and_their_values_not_drawn(tmp_path: Path) -> None:
     out = write_run(tmp_path / "out", (FakeCase("c", frames=6, failed=(2,)),))
-    drawing = CASE_FIGURES["error_by_depth"](read_case(out / "cases" / "c"))
-    assert drawing is not None
-    lines = {str(line.get_label()): line for line in drawing.figure.axes[0].get_lines()}
+    drawing = draw(CASE_FIGURES["error_by_depth"], read_case(out / "cases" / "c"))
+    lines = lines_of(drawing)
     assert len(lines["frame without result"].get_xdata()) == 1
     assert len(lines["simulated to traced, rms"].get_xdata()) == 5
     assert len(drawing.table) == 6
@@ -606,8 +599,7 @@ def test_the_largest_of_nearly_equal_values_has_room_for_its_marker() -> None:
 def test_errors_have_the_colours_of_the_viewer_in_figures(tmp_path: Path) -> None:
     """They had two scales: blue to pink in the viewer, dark to bright in the maps."""
     case = read_case(write_run(tmp_path / "out", (FakeCase("c", frames=3),)) / "cases" / "c")
-    drawing = CASE_FIGURES["error_along_wire"](case)
-    assert drawing is not None
+    drawing = draw(CASE_FIGURES["error_along_wire"], case)
     (mesh,) = (c for axes in drawing.figure.axes[:1] for c in axes.collections)
     ends = [to_hex(mesh.cmap(end)) for end in (0.0, 1.0)]
     assert ends == [colours.SIMULATED.lower(), colours.FAR.lower()]
@@ -661,8 +653,7 @@ def test_every_parameter_of_a_calibration_has_a_panel() -> None:
     row = {"value": 1.0, "prior": 1.0, "sd": 0.1, "seen": True, "logarithmic": False}
     rows = [{"name": name, **row} for name in ("taper", "depth_offset_mm")]
     record = {"estimates": rows, "profiles": {"taper": [[0.9, 1.2], [1.1, 0.9]]}}
-    drawing = figures_of("calibration")["profiles"](record)
-    assert drawing is not None
+    drawing = draw(figures_of("calibration")["profiles"], record)
     panels = {axes.get_title(): axes.get_lines()[0] for axes in drawing.figure.axes}
     assert list(panels) == ["taper", "depth_offset_mm"]
     assert panels["taper"].get_xydata().tolist() == [[0.9, 1.2], [1.0, 0.0], [1.1, 0.9]]
@@ -679,8 +670,7 @@ def test_an_axis_of_a_calibration_ends_where_values_end() -> None:
     """Friction went down to -0.2; what is not seen was said in a red that cannot be read on a dark page."""
     row = {"name": "friction", "value": 0.02, "prior": 0.0, "sd": 0.08, "seen": False, "logarithmic": False}
     record = {"estimates": [row | {"bounds": [0.0, 0.5]}], "profiles": {"friction": [[0.0, 0.1], [0.1, 1.0]]}}
-    drawing = figures_of("calibration")["profiles"](record)
-    assert drawing is not None
+    drawing = draw(figures_of("calibration")["profiles"], record)
     low, high = drawing.figure.axes[0].get_xlim()
     assert -0.02 < low < 0.0, "the line of what is stated lies within"
     assert high == pytest.approx(0.26)
@@ -694,8 +684,7 @@ def test_a_caption_says_only_what_is_drawn_of_the_cases(cases: int, said: bool, 
     out = write_run(tmp_path / "out", tuple(FakeCase(f"c{n}", frames=3) for n in range(cases)))
     errors = {f"c{n}": read_case(out / "cases" / f"c{n}").errors for n in range(cases)}
     run = RunFiles(errors, tables.read(out / "summary.csv", SUMMARY), tables.read_if_there(None, SWEEP))
-    drawing = RUN_FIGURES["planned_within"](run)
-    assert drawing is not None
+    drawing = draw(RUN_FIGURES["planned_within"], run)
     (entry,) = [entry for entry in declared("run") if entry["figure"] == "planned_within"]
     assert ("thin: each case" in caption(entry["read"], drawing.table)) == said
     assert len(drawing.figure.axes[0].get_lines()) == 1 + said * cases
@@ -708,8 +697,7 @@ def test_the_caption_speaks_of_a_cross_where_there_is_one(frame: int | None, tmp
     path = out / "cases" / "c" / "errors.csv"
     errors = tables.read(path, ERRORS)
     tables.write(path, ERRORS, errors.assign(branch_ok=[n != frame for n in range(3)]))
-    drawing = CASE_FIGURES["tip_by_depth"](read_case(path.parent))
-    assert drawing is not None
+    drawing = draw(CASE_FIGURES["tip_by_depth"], read_case(path.parent))
     (entry,) = [entry for entry in declared("case") if entry["figure"] == "tip_by_depth"]
     said = caption(entry["bad"], drawing.table)
     assert ("filled cross" in said) == (frame is not None)
@@ -737,8 +725,7 @@ def test_the_first_figure_draws_the_predictor_that_the_verdict_names(tmp_path: P
     def drawn(strongest: str) -> tuple[set[str], bool, str]:
         case.result["summary"]["strongest_null"] = strongest  # type: ignore[index]
         known = replace(case, errors=case.errors.assign(**{rival: [0.5, 0.6, 0.7, 0.8]}))
-        drawing = CASE_FIGURES["error_by_depth"](known)
-        assert drawing is not None
+        drawing = draw(CASE_FIGURES["error_by_depth"], known)
         legend = drawing.figure.axes[0].get_legend_handles_labels()[1]
         said = {label for label in legend if "(strongest)" in label}
         return said, rival in drawing.table, caption(entry["read"], drawing.table)
