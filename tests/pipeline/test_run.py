@@ -10,6 +10,7 @@ import subprocess
 import tomllib
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -68,6 +69,24 @@ def finished(study: Path, store: Path, tmp_path_factory: pytest.TempPathFactory)
     out = tmp_path_factory.mktemp("out")
     assert run(study, out) == 0
     return out
+
+
+@pytest.fixture
+def out(finished: Path, tmp_path: Path) -> Path:
+    """The finished run, to be changed."""
+    return Path(shutil.copytree(finished, tmp_path / "out"))
+
+
+@pytest.fixture
+def folder(study: Path, tmp_path: Path) -> Path:
+    """The study, to be changed."""
+    return Path(shutil.copytree(study, tmp_path / "study"))
+
+
+def result_of(out: Path) -> dict[str, Any]:
+    """What result.json of the one case says."""
+    (path,) = out.glob("cases/*/result.json")
+    return json.loads(path.read_text(encoding="utf-8"))
 
 
 def run(study: Path, out: Path, *more: str) -> int:
@@ -131,19 +150,15 @@ def test_insertion_is_arc_length_from_the_entry(finished: Path) -> None:
 
 
 def test_the_same_command_again_keeps_what_is_finished(
-    finished: Path, study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    out: Path, study: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    out = tmp_path / "out"
-    shutil.copytree(finished, out)
     before = (out / "cases" / "bifurcation" / "frames.h5").stat().st_mtime_ns
     assert run(study, out) == 0
     assert "unchanged since the last run, kept" in capsys.readouterr().err
     assert (out / "cases" / "bifurcation" / "frames.h5").stat().st_mtime_ns == before
 
 
-def test_a_case_that_was_cut_off_is_finished_by_the_same_command(finished: Path, study: Path, tmp_path: Path) -> None:
-    out = tmp_path / "out"
-    shutil.copytree(finished, out)
+def test_a_case_that_was_cut_off_is_finished_by_the_same_command(finished: Path, out: Path, study: Path) -> None:
     (out / "cases" / "bifurcation" / "result.json").unlink()
     assert run(study, out) == 0
     assert differences(finished, out) == []
@@ -180,11 +195,7 @@ def test_fresh_removes_the_cases_of_the_manifest_before(
     assert {path.name for path in (out / "cases").iterdir()} == {"renamed", "mine"}
 
 
-def test_fewer_stages_do_not_wipe_what_is_finished(
-    study: Path, finished: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    out = tmp_path / "out"
-    shutil.copytree(finished, out)
+def test_fewer_stages_do_not_wipe_what_is_finished(study: Path, out: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for more in ((), ("--resume",)):
         assert run(study, out, "--until", "trace", *more) == 2
         assert "say --fresh" in capsys.readouterr().err
@@ -259,11 +270,10 @@ def edited(study: Path, folder: Path, old: str, new: str) -> Path:
 
 
 def test_what_is_doubtful_in_a_manifest_is_said_by_the_run_itself(
-    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Only `check` and a dry run said it, which nobody has to call; -q hides no warning."""
-    folder, out = tmp_path / "study", tmp_path / "out"
-    shutil.copytree(study, folder)
+    out = tmp_path / "out"
     text = (folder / "manifest.toml").read_text(encoding="utf-8")
     case = tomllib.loads(text)["case"][0]
     head, body = text.split("[[case]]")
@@ -343,9 +353,7 @@ def test_an_edited_lumen_gives_new_traces(study: Path, finished: Path, tmp_path:
     assert reused_traces(out) == 0
 
 
-def test_a_finished_case_gets_the_page_that_is_asked_for(study: Path, finished: Path, tmp_path: Path) -> None:
-    out = tmp_path / "out"
-    shutil.copytree(finished, out)
+def test_a_finished_case_gets_the_page_that_is_asked_for(study: Path, out: Path) -> None:
     page = out / "cases" / "bifurcation" / "report.html"
     assert 'src="figures/' in page.read_text(encoding="utf-8")
     assert run(study, out, "--embed") == 0
@@ -353,11 +361,9 @@ def test_a_finished_case_gets_the_page_that_is_asked_for(study: Path, finished: 
 
 
 def test_every_pooled_number_is_of_the_frames_that_are_ok(
-    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Frame 2 disagrees with the manifest's depth: it has errors of its own, and no say in any pooled number."""
-    folder = tmp_path / "study"
-    shutil.copytree(study, folder)
     path, lines = folder / "manifest.toml", []
     for line in (folder / "manifest.toml").read_text(encoding="utf-8").splitlines():
         name, _, value = line.partition("=")
@@ -392,11 +398,9 @@ def test_predictors_are_told_of_trusted_traces_alone(study: Path, tmp_path: Path
 
 
 def test_nothing_of_an_earlier_run_stays_beside_a_new_result(
-    study: Path, finished: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    study: Path, out: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Traced only, a case has no errors: those of the run before must not come back in the last line."""
-    out = tmp_path / "out"
-    shutil.copytree(finished, out)
     assert run(study, out, "--until", "trace", "--fresh") == 0
     last = capsys.readouterr().out
     assert "median point error" not in last
@@ -409,9 +413,8 @@ def test_nothing_of_an_earlier_run_stays_beside_a_new_result(
     assert not list((out / "cases" / "bifurcation" / "view").glob("wire_simulated*"))
 
 
-def test_the_page_of_a_case_without_a_lumen_shows_the_scan_at_the_entry(study: Path, tmp_path: Path) -> None:
+def test_the_page_of_a_case_without_a_lumen_shows_the_scan_at_the_entry(folder: Path, tmp_path: Path) -> None:
     """It had no picture, where one would have shown that the entry lies beside the vessel."""
-    folder = Path(shutil.copytree(study, tmp_path / "study"))
     scan = sitk.ReadImage(str(folder / "reference.mha"))
     beside = [3, 5, 7]
     manifest = folder / "manifest.toml"
@@ -434,9 +437,7 @@ def test_the_page_of_a_case_without_a_lumen_shows_the_scan_at_the_entry(study: P
     assert 'id="scan_at_entry"' in (case / "report.html").read_text(encoding="utf-8")
 
 
-def test_report_rebuilds_from_files_alone(finished: Path, tmp_path: Path) -> None:
-    out = tmp_path / "out"
-    shutil.copytree(finished, out)
+def test_report_rebuilds_from_files_alone(finished: Path, out: Path, tmp_path: Path) -> None:
     for name in ("summary.csv", "index.html"):
         (out / name).unlink()
     shutil.rmtree(out / "cases" / "bifurcation" / "figures")
@@ -475,11 +476,7 @@ def test_paraview_opens_a_real_case(finished: Path, tmp_path: Path) -> None:
         assert (near & (saturation > 0.4)).sum() > 50, f"no {name} wire to be seen"
 
 
-def test_a_run_of_calibration_cases_says_that_nothing_is_scored(
-    finished: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    out = tmp_path / "out"
-    shutil.copytree(finished, out)
+def test_a_run_of_calibration_cases_says_that_nothing_is_scored(out: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = out / "cases" / "bifurcation" / "result.json"
     result = json.loads(path.read_text(encoding="utf-8"))
     result |= {"role": "calibration", "summary": result["summary"] | {"role": "calibration"}}
@@ -553,10 +550,9 @@ def test_the_same_scans_count_once(short: Path, tmp_path: Path, capsys: pytest.C
     assert "its frame counts twice" in capsys.readouterr().out
 
 
-def test_a_frame_under_two_names_counts_once(study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_frame_under_two_names_counts_once(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A copy is refused at the door; the same voxels in another file are told when they are read."""
-    folder, out = tmp_path / "study", tmp_path / "out"
-    shutil.copytree(study, folder)
+    out = tmp_path / "out"
     first, *_, last = sorted((folder / "frames").iterdir())
     own = last.read_bytes()
     shutil.copy(first, last)
@@ -594,10 +590,9 @@ def test_the_same_voxels_in_other_files_are_one_insertion(
     assert pd.read_csv(tmp_path / "out" / "overall.csv")["insertions"].item() == 1
 
 
-def test_own_curves_are_held_against_the_wires_that_are_seen(study: Path, finished: Path, tmp_path: Path) -> None:
+def test_own_curves_are_held_against_the_wires_that_are_seen(folder: Path, finished: Path, tmp_path: Path) -> None:
     """Curves given to the wrong frames were ok, at 0.04 mm and a skill of 0.998."""
-    folder, said = tmp_path / "study", []
-    shutil.copytree(study, folder)
+    said = []
     manifest = folder / "manifest.toml"
     kept = [line for line in manifest.read_text(encoding="utf-8").splitlines() if not line.startswith("insertion_mm")]
     manifest.write_text("\n".join(kept).replace("[[case]]", '[[case]]\ntraces = "own/*.csv"'), encoding="utf-8")
@@ -608,7 +603,7 @@ def test_own_curves_are_held_against_the_wires_that_are_seen(study: Path, finish
         for number, curve in enumerate(order):
             np.savetxt(folder / "own" / f"{number:03d}.csv", curve, delimiter=",", header="x_mm,y_mm,z_mm", comments="")
         run(folder, tmp_path / "out", *QUICK, "--fresh")
-        result = json.loads((tmp_path / "out" / "cases" / "bifurcation" / "result.json").read_text(encoding="utf-8"))
+        result = result_of(tmp_path / "out")
         said.append([text for text in result["warnings"] if "own curves are not where the scans show" in text])
     assert not said[0]
     (text,) = said[1]
@@ -692,13 +687,11 @@ def test_an_unexpected_error_costs_one_case(
 
 
 def test_a_folder_of_scans_is_enough(
-    study: Path, finished: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    folder: Path, finished: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    folder = tmp_path / "scans"
-    shutil.copytree(study, folder)
     (folder / "manifest.toml").unlink()
-    case = json.loads((finished / "cases" / "bifurcation" / "result.json").read_text(encoding="utf-8"))
-    entry, direction = case["entry"]["entry_mm"], case["entry"]["entry_direction"]
+    case = result_of(finished)["entry"]
+    entry, direction = case["entry_mm"], case["entry_direction"]
     words = [f"--entry={','.join(map(str, entry))}", f"--direction={','.join(map(str, direction))}"]
     assert main(["run", str(folder), "-o", str(tmp_path / "out"), *words]) == 0
     printed = capsys.readouterr().out
@@ -708,14 +701,12 @@ def test_a_folder_of_scans_is_enough(
     assert list(errors_of(tmp_path / "out")["trace_sigma_mm"].notna()) == [True] * FRAMES
 
 
-def test_the_entry_is_inferred_where_the_wire_comes_in(study: Path, finished: Path, tmp_path: Path) -> None:
-    folder = tmp_path / "scans"
-    shutil.copytree(study, folder)
+def test_the_entry_is_inferred_where_the_wire_comes_in(folder: Path, finished: Path, tmp_path: Path) -> None:
     (folder / "manifest.toml").unlink()
     assert main(["run", str(folder), "-o", str(tmp_path / "out"), "--until", "segment"]) == 0
     text = (tmp_path / "out" / "manifest.inferred.toml").read_text(encoding="utf-8")
     found = [json.loads(line.split("=")[1]) for line in text.splitlines() if line.startswith("entry_")]
-    case = json.loads((finished / "cases" / "bifurcation" / "result.json").read_text(encoding="utf-8"))["entry"]
+    case = result_of(finished)["entry"]
     # a guess from voxels of 0.75 mm: two of them, and the angle of one over the 5 mm that give the direction
     assert np.linalg.norm(np.subtract(found[0], case["entry_mm"])) < 1.5
     assert np.degrees(np.arccos(np.dot(found[1], case["entry_direction"]))) < 8.0
@@ -737,11 +728,9 @@ def test_a_crash_in_a_sweep_is_said_and_counted(
 
 
 def test_pages_of_many_cases_are_drawn_with_a_line_each(
-    finished: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    finished: Path, out: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """One that cannot be drawn is named, and the exit code tells."""
-    out = tmp_path / "out"
-    shutil.copytree(finished, out)
     monkeypatch.setattr("pipeline.commands.report.MANY", 1)
     assert main(["report", str(out)]) == 0
     assert capsys.readouterr().err == "1/1 bifurcation: drawn\n"
@@ -757,24 +746,17 @@ def test_pages_of_many_cases_are_drawn_with_a_line_each(
     assert "drawn" not in capsys.readouterr().err, "of a few there is no line each"
 
 
-def test_whether_the_lumen_was_segmented_beside_a_wire_is_said(finished: Path, tmp_path: Path, study: Path) -> None:
+def test_whether_the_lumen_was_segmented_beside_a_wire_is_said(finished: Path, folder: Path, tmp_path: Path) -> None:
     said = "no reference scan: the lumen was segmented from frame 0, which has a wire in it"
-    with_one = json.loads((finished / "cases" / "bifurcation" / "result.json").read_text(encoding="utf-8"))
-    assert said not in with_one["assumptions"]
-    shutil.copytree(study, tmp_path / "study")
-    manifest = tmp_path / "study" / "manifest.toml"
+    assert said not in result_of(finished)["assumptions"]
+    manifest = folder / "manifest.toml"
     lines = manifest.read_text(encoding="utf-8").splitlines(keepends=True)
     manifest.write_text("".join(s for s in lines if not s.startswith("reference")), encoding="utf-8")
-    run(tmp_path / "study", tmp_path / "out", "--until", "segment")
-    result = json.loads((tmp_path / "out" / "cases" / "bifurcation" / "result.json").read_text(encoding="utf-8"))
-    assert said in result["assumptions"]
+    run(folder, tmp_path / "out", "--until", "segment")
+    assert said in result_of(tmp_path / "out")["assumptions"]
 
 
-def test_a_damaged_result_hides_no_other(
-    finished: Path, study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    out = tmp_path / "out"
-    shutil.copytree(finished, out)
+def test_a_damaged_result_hides_no_other(out: Path, study: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (out / "cases" / "other").mkdir()
     named_by_a_shard(out, "other")
     damaged = out / "cases" / "other" / "result.json"
@@ -815,11 +797,7 @@ def test_a_result_with_other_contents_is_damaged(tmp_path: Path, content: str) -
     assert "other" in render_index(tmp_path).read_text(encoding="utf-8")
 
 
-def test_points_cut_short_hide_no_other_case(
-    finished: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    out = tmp_path / "out"
-    shutil.copytree(finished, out)
+def test_points_cut_short_hide_no_other_case(out: Path, capsys: pytest.CaptureFixture[str]) -> None:
     shutil.copytree(out / "cases" / "bifurcation", out / "cases" / "other")
     named_by_a_shard(out, "other")
     result = out / "cases" / "other" / "result.json"
@@ -853,10 +831,8 @@ def test_a_wrong_command_line_runs_nothing(
     assert not (tmp_path / "out").exists()
 
 
-def test_check_lists_problems_of_the_scans(study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_check_lists_problems_of_the_scans(study: Path, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["check", str(study / "manifest.toml")]) == 0
-    folder = tmp_path / "study"
-    shutil.copytree(study, folder)
     image = sitk.ReadImage(str(folder / "reference.mha"))
     image.SetOrigin([c + 5.0 for c in image.GetOrigin()])
     sitk.WriteImage(image, str(folder / "reference.mha"))
@@ -876,9 +852,7 @@ def test_check_lists_problems_of_the_scans(study: Path, tmp_path: Path, capsys: 
     assert f"the scan spans {first} to {last} mm in LPS" in said
 
 
-def test_a_case_without_frames_is_simulated_only(study: Path, tmp_path: Path) -> None:
-    folder = tmp_path / "study"
-    shutil.copytree(study, folder)
+def test_a_case_without_frames_is_simulated_only(folder: Path, tmp_path: Path) -> None:
     lines = (folder / "manifest.toml").read_text(encoding="utf-8").splitlines()
     kept = [line for line in lines if not line.startswith(("frames", "truth"))]
     (folder / "manifest.toml").write_text("\n".join(kept), encoding="utf-8")
@@ -936,12 +910,8 @@ def test_a_borrowed_clamp_is_that_of_the_other_case(finished: Path, study: Path,
     np.testing.assert_array_equal(own["entry"]["used_mm"], borrowed["entry"]["used_mm"])
 
 
-def test_a_roll_is_fitted_where_frames_are_left_to_score(
-    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_roll_is_fitted_where_frames_are_left_to_score(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     # one frame: it ended as "0 frames: 0 ok", exit 0
-    folder = tmp_path / "study"
-    shutil.copytree(study, folder)
     manifest, frame = folder / "manifest.toml", sorted((folder / "frames").iterdir())[0]
     text = re.sub(
         r"^(roll_deg|insertion_mm|truth) = .*\n", "", manifest.read_text(encoding="utf-8"), flags=re.MULTILINE
@@ -954,10 +924,8 @@ def test_a_roll_is_fitted_where_frames_are_left_to_score(
     assert main(["check", str(folder)]) == 0
 
 
-def test_a_failed_frame_names_its_scan(study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_failed_frame_names_its_scan(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Its number alone sends nobody to the file."""
-    folder = tmp_path / "study"
-    shutil.copytree(study, folder)
     frames = sorted((folder / "frames").iterdir())
     empty = sitk.ReadImage(str(folder / "reference.mha"))
     empty[0, 0, 0] += 1  # a scan of its own
