@@ -15,19 +15,21 @@ _NUMBER = re.compile(r"\d+(\.\d+)?")
 def alike(rows: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
     """Rows of failures.csv, those of a case that differ in frame, scan and numbers alone merged into the first.
 
-    Each has ``count``, how many rows it stands for, ``frames``, their numbers in words (empty for a whole case), and
-    ``files``, the files that could not be read where there are several.
+    Each has ``count``, how many rows it stands for, ``frames``, their numbers in words, and ``of``, the same behind
+    ``frame`` or ``frames`` (empty for a whole case), and ``files``, the files that could not be read where there are
+    several.
     """
     groups: dict[tuple[str, ...], list[Mapping[str, Any]]] = {}
     for row in rows:
         message = _NUMBER.sub("#", _SCAN.sub("", str(row.get("message") or "")))
         key = (*(str(row.get(name) or "") for name in ("simulator", "case", "stage", "status")), message)
         groups.setdefault(key, []).append(row)
-    return [
-        {**own[0], "count": len(own), "frames": in_words([row["frame"] for row in own if _stated(row)])}
-        | {"files": _files(own)}
-        for own in groups.values()
-    ]
+    return [{**own[0], "count": len(own), "files": _files(own), **_of_frames(own)} for own in groups.values()]
+
+
+def _of_frames(rows: Sequence[Mapping[str, Any]]) -> dict[str, str]:
+    numbers = [row["frame"] for row in rows if _stated(row)]
+    return {"frames": in_words(numbers), "of": frames_in_words(numbers) if numbers else ""}
 
 
 def _files(rows: Sequence[Mapping[str, Any]]) -> str:
@@ -51,6 +53,11 @@ def in_words(frames: Sequence[int]) -> str:
         else:
             runs.append([frame])
     return ", ".join(f"{run[0]} to {run[-1]}" if len(run) > 2 else ", ".join(map(str, run)) for run in runs)
+
+
+def frames_in_words(numbers: Sequence[int]) -> str:
+    """``frame 1``, ``frames 0 to 3, 5``."""
+    return f"frame{'s' * (len(numbers) > 1)} {in_words(numbers)}"
 
 
 def of_what(rows: Iterable[Mapping[str, Any]]) -> str:

@@ -27,7 +27,7 @@ from reports.gates import gates_in
 from reports.origin import why_not_pooled
 from reports.pdf_page import RIGHT, WIDE, Figured, Page
 from reports.records import read_json
-from reports.run_page import readable_cases, run_files
+from reports.run_page import frames_not_run, readable_cases, run_files
 from reports.schema import FAILURES, OVERALL_FILE, SUMMARY
 from reports.tables import first_row, in_texts, read_if_there
 from reports.unscored import unscored
@@ -87,7 +87,7 @@ def _first(out_dir: Path, summary: pd.DataFrame, whole: pd.DataFrame) -> Page:
     if worse := worse_sentence(summary.to_dict("records")):
         page.text(worse, size=11, colour=colours.BAD)
     if missing := not_run_sentence(out_dir):
-        page.text(f"Of the study {missing}. Every number is over the other cases alone.", size=11, colour=colours.BAD)
+        page.text(f"Of the study {missing}. {frames_not_run(out_dir)}", size=11, colour=colours.BAD)
     if len(failures):
         _failures(page, failures, out_dir)
     for tile in _content.in_tiles(_content.overall(declared("overall"), whole))["tiles"]:
@@ -103,7 +103,7 @@ def _failures(page: Page, failures: pd.DataFrame, out_dir: Path) -> None:
     page.text(f"Failures: {of_what(rows)}", size=11, weight="bold", colour=colours.BAD)
     for row in rows[:_MOST_FAILURES]:
         case = ": ".join(filter(None, (row["simulator"], row["case"])))
-        frames = f", frame{'s' * (row['count'] > 1)} {row['frames']}" * bool(row["frames"])
+        frames = f", {row['of']}" * bool(row["of"])
         text = textwrap.shorten(str(row["message"]), 300, placeholder="…")
         files = f"{row['files']}. " * bool(row["files"])
         page.text(f"{case}{frames}: {row['status']}. {files}{text}")

@@ -154,7 +154,7 @@ def _worse_cases(summary: pd.DataFrame, links: Mapping[str, str]) -> dict[str, A
 def _not_counted(out_dir: Path) -> dict[str, str]:
     """Cases that no number of the page is over, and results that its sweep lacks."""
     said = {"left_over": left_over_sentence, "not_run": not_run_sentence, "left_out": left_out_sentence}
-    said |= {"not_swept": not_swept_sentence, "not_run_counted": _frames_not_run}
+    said |= {"not_swept": not_swept_sentence, "not_run_counted": frames_not_run}
     return {name: sentence(out_dir) for name, sentence in said.items()}
 
 
@@ -163,7 +163,7 @@ def _not_run_counted(out_dir: Path) -> bool:
     return bool(read_if_there(out_dir / FAILURES.file, FAILURES)["status"].eq("not_run").any())
 
 
-def _frames_not_run(out_dir: Path) -> str:
+def frames_not_run(out_dir: Path) -> str:
     """What becomes of the frames of cases without a result in the numbers of the page."""
     if not _not_run_counted(out_dir):
         return "Every number below is over the other cases alone, shares of planned frames, too."

@@ -157,13 +157,9 @@ def _failed(folder: Path, name: str) -> list[str]:
     """
     rows = in_texts(read_if_there(folder / FAILURES.file, FAILURES))
     found = alike(row for row in rows if row["simulator"] in ("", name))
-    lines = [f"{row['case']}, {_which(row)}: {row['status']}: {row['sentence']}" for row in found]
+    lines = [f"{row['case']}, {row['of'] or 'all frames'}: {row['status']}: {row['sentence']}" for row in found]
     rest = len(lines) - _MOST_REASONS
     return [*lines[:_MOST_REASONS], *[f"and {counted(rest, 'more reason')}"] * (rest > 0)]
-
-
-def _which(row: Mapping[str, Any]) -> str:
-    return f"frame{'s' * (row['count'] > 1)} {row['frames']}" if row["frames"] else "all frames"
 
 
 def _not_ours(warnings: Mapping[str, list[str]], ours: Mapping[str, list[str]]) -> list[str]:

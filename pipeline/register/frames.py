@@ -9,7 +9,7 @@ from pipeline.arrays.grids import sampled
 from pipeline.model import Curve, Lumen, Volume
 from pipeline.register import Anchor, Registration, Rest, anchor, register
 from pipeline.register.rigid import Motion
-from reports.alike import in_words
+from reports.alike import frames_in_words
 from reports.case_files import frames_named
 
 HIDES = (
@@ -91,7 +91,7 @@ def sentences_of(alignment: Alignment, found: Mapping[int, Registration | None])
     for n, r in known:
         if not r.trusted or (r.applied and r.doubt):
             doubtful.setdefault(r.sentence, []).append(n)
-    told = [f"frame{'s' * (len(numbers) > 1)} {in_words(numbers)}: {text}" for text, numbers in doubtful.items()]
+    told = [f"{frames_in_words(numbers)}: {text}" for text, numbers in doubtful.items()]
     return texts, told + _of_rests([(n, r.rests) for n, r in known])
 
 

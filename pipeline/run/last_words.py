@@ -52,9 +52,8 @@ def lost_lines(lost: Sequence[tuple[Path, Result]]) -> list[str]:
 
 def _failure(row: Mapping[str, Any]) -> str:
     """One line for all frames that failed alike."""
-    several = row["count"] > 1
-    of = f" frame{'s' * several} {row['frames']}" * bool(row["frames"])
-    said = f"in frame {row['frame']}: {row['message']}" if several and row["message"] else row["message"]
+    of = f" {row['of']}" * bool(row["of"])
+    said = f"in frame {row['frame']}: {row['message']}" if row["count"] > 1 and row["message"] else row["message"]
     files = f"{row['files']}; " * bool(row["files"])
     return f"{row['case']}{of}: {row['status']}: {files}{said or row['sentence']}"
 

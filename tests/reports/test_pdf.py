@@ -13,7 +13,7 @@ from reports import pdf, tables
 from reports._content import worst_first
 from reports.pdf import write_pdf
 from reports.pdf_page import BOTTOM, Page
-from reports.schema import SUMMARY
+from reports.schema import FAILURES, SUMMARY
 from tests.reports.fake_results import FakeCase, write_run
 from tests.unseen import undrawn
 from tests.unseen import unseen as unseen
@@ -86,6 +86,20 @@ def test_warnings_and_assumptions_are_whole(tmp_path: Path) -> None:
         assert words in said[1]
     assert [text.count("to its end") for text in said] == [4, 1]
     assert first.at > BOTTOM + 0.1, "room for more than that"
+
+
+@pytest.mark.usefixtures("unseen")
+def test_frames_of_cases_without_a_result_are_in_shares(tmp_path: Path) -> None:
+    """It said "every number is over the other cases alone" where `wireval report` had counted them."""
+    out = write_run(tmp_path / "out", [FakeCase("a", frames=2)])
+    run = json.loads((out / "run.json").read_text(encoding="utf-8"))
+    (out / "run.json").write_text(json.dumps(run | {"planned": ["a", "lost"]}), encoding="utf-8")
+    summary = tables.read(out / "summary.csv", SUMMARY)
+    for rows, said in ([], "alone, shares of planned frames, too."), ([{"status": "not_run"}], "theirs among them."):
+        tables.write(out / "failures.csv", FAILURES, [{"case": "lost"} | row for row in rows])
+        page = " ".join(text.get_text() for text in next(pdf._pages(out, summary)).figure.texts)
+        assert "without a result here: lost." in page
+        assert said in page
 
 
 def test_texts_that_do_not_fit_a_page_are_counted() -> None:
