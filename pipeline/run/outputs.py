@@ -149,7 +149,7 @@ def _over_u(frame: Frame, count: int) -> dict[str, NDArray[Any]]:
 
 def message_of(frame: Frame, known: Known) -> str:
     """What went wrong with a frame, and the name of its scan: the frame's number alone does not tell the file."""
-    if not frame.message or known.scans is None or frame.index >= len(known.scans.frames):
+    if not frame.message or frame.index >= len(known.scans.frames):
         return frame.message
     source = known.scans.frames[frame.index].source
     name = str(replace(source, path=Path(source.path.name)))

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import AfterValidator, TypeAdapter, ValidationError
 
-from pipeline.load import Scans
+from pipeline.load import Header
 from pipeline.register.frames import record
 from pipeline.run import ledger
 from pipeline.run.calibrated import data_of
@@ -238,7 +238,7 @@ def details_of(case: Case, known: Known, log: Log) -> dict[str, Any]:
         "wall": case.wall,
         "entry": clamp,
         **{name: value for name in ("down", "catheter") if (value := getattr(case, name)) is not None},
-        "geometry": _geometry(known.scans),
+        "geometry": _geometry(known.scans.first),
         "inputs": described(case),
         "counters": log.counters,
         "chosen": log.chosen,
@@ -261,12 +261,10 @@ def _marked(frame: Frame) -> dict[str, float]:
     return {name: float(np.mean(np.asarray(values))) for name, values in marks.items()}
 
 
-def _geometry(scans: Scans | None) -> dict[str, Any]:
+def _geometry(scan: Header | None) -> dict[str, Any]:
     """Geometry of the first scan; all share it."""
-    if scans is None or scans.first is None:
-        return {}
-    names = ("shape", "spacing_mm", "origin_mm", "direction", "pixel_type")
-    return {name: getattr(scans.first, name) for name in names}
+    names = ("shape", "spacing_mm", "origin_mm", "direction", "pixel_type") if scan is not None else ()
+    return {name: getattr(scan, name) for name in names}
 
 
 def jsonable(value: Any) -> Any:

@@ -100,8 +100,6 @@ def _scans_of(known: Known, shown: int) -> tuple[dict[str, Path], str]:
     Also why others are left out. Not all frames: a scene is opened whole, and a hundred scans take more memory than a
     computer has.
     """
-    if known.scans is None:
-        return {}, ""
     frame = {f"frame {shown}": header for header in known.scans.frames[shown : shown + 1]}
     headers = ({"reference": known.scans.reference} if known.scans.reference else {}) | frame
     why = {name: _unlike(header) for name, header in headers.items()}

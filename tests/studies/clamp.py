@@ -30,6 +30,7 @@ from pipeline.run.cache import Store
 from pipeline.run.log import Log
 from pipeline.run.stages import Context, Known, run_stages
 from pipeline.run.stages.clamp import clamp_of
+from pipeline.run.stages.known import NO_SCANS
 from pipeline.run.stages.simulate import simulate_frames
 from pipeline.simulate.clamp import axes_of
 from pipeline.study.manifest import Case, read_manifest
@@ -86,7 +87,7 @@ def traced(name: str, cnr: float, seed: int, folder: Path) -> Traced:
     true = tuple(frame.points_mm for frame in study.truth)
     frames = tuple(replace(frame, projections=()) for frame in known.frames)
     failure = str(known.failure or "")
-    known = replace(known, scans=None, frames=frames, failure=None)
+    known = replace(known, scans=NO_SCANS, frames=frames, failure=None)
     found = Traced(name, cnr, seed, case, known, study.setup.entry_mm, study.setup.direction, true, failure)
     folder.mkdir(parents=True, exist_ok=True)
     kept.write_bytes(pickle.dumps(found))

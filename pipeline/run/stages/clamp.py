@@ -89,8 +89,7 @@ def _replayed(
     most_mm: float = np.inf,
 ) -> list[list[Solution]]:
     """The wire of every frame from several clamps, with the longest segments, of ``most_mm`` at most."""
-    case, config, lumen = run.case, run.config, known.lumen
-    assert lumen is not None
+    case, config, lumen = run.case, run.config, known.vessel
     longest = lengths_mm(config.solver.segment_mm, altered(case.wire, config.simulate).rest_curvature_per_mm)[0]
     settings = config.solver.quick(min(longest, most_mm))
     insertions = [

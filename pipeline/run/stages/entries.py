@@ -40,14 +40,13 @@ def _entries(run: Context, known: Known) -> dict[tuple[str, str], Entry]:
 
 def replayed_entries(run: Context, known: Known) -> list[list[Solution]]:
     """The wires of each frame from four entries, with the segments of the case."""
-    case, config, lumen = run.case, run.config, known.lumen
-    assert lumen is not None
+    case, config = run.case, run.config
     entries = _entries(run, known).values()
     if not entries:
         return []
     solver = replace(config.solver, segment_mm=known.segment_mm)
     shared = solver, config.simulate, case.catheter
-    insertions = [insertion_of(case.wire, case.wall, lumen, clamp, *shared) for clamp, _ in entries]
+    insertions = [insertion_of(case.wire, case.wall, known.vessel, clamp, *shared) for clamp, _ in entries]
     return together(insertions, [_way(run, known, *entry) for entry in entries])
 
 

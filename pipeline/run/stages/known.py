@@ -135,6 +135,7 @@ def trusted(frames: Sequence[Frame]) -> dict[int, Curve]:
 
 
 Result = TypeVar("Result", Lumen, Curve)
+NO_SCANS = Scans(None, ())
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,7 +151,7 @@ class Known:
     failure : why the case went no further.     at_entry : the scan around the entry, where no lumen was found.
     """
 
-    scans: Scans | None = None
+    scans: Scans = NO_SCANS
     lumen: Lumen | None = None
     lumen_doubt: str = ""
     off_the_scans: bool = False

@@ -38,7 +38,6 @@ def segment_vessel(run: Context, known: Known) -> Known:
         doubt = _held_against(run, known, lumen)
         log.warnings += [doubt.told] * bool(doubt.told)
         return replace(known, lumen=lumen, lumen_doubt=doubt.told * doubt.far)
-    assert known.scans is not None
     scan = known.scans.first
     assert scan is not None, "the manifest guarantees frames, a reference or a lumen"
     with_wire = known.scans.reference is None
@@ -103,7 +102,7 @@ def _box_of(lumen: Lumen) -> tuple[Array, Array]:
 
 def _held_against(run: Context, known: Known, lumen: Lumen) -> LumenDoubt:
     """What the case's first scan, if it has one, says of the user's own lumen."""
-    scan = None if known.scans is None else known.scans.first
+    scan = known.scans.first
     if scan is None:
         return LumenDoubt()
     try:
@@ -116,7 +115,7 @@ def _held_against(run: Context, known: Known, lumen: Lumen) -> LumenDoubt:
 
 def scan_at_entry(run: Context, known: Known) -> ScanCrop | None:
     """The scan around the entry, as pictures for a case without a lumen; None where it cannot be read."""
-    scan = None if known.scans is None else known.scans.first
+    scan = known.scans.first
     if scan is None:
         return None
     try:

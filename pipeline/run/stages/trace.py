@@ -53,7 +53,6 @@ from pipeline.trace.saturated import cut_off, saturated
 
 def trace_frames(run: Context, known: Known) -> Known:
     """Every frame's wire, each with the previous one as a prior."""
-    assert known.scans is not None
     given = given_curves(run)
     voxel_mm = known.vessel.distance.voxel_mm
     if not known.scans.frames:
@@ -146,7 +145,6 @@ class _Tracing:
     """What all frames share: the box around the lumen, the wire-free scan there, and the alignment of the phantom."""
 
     def __init__(self, run: Context, known: Known, given: list[Curve]) -> None:
-        assert known.scans is not None
         self.run, self.lumen, self.load, settings = run, known.vessel, run.config.load, run.config.trace
         self.frames, self.headers, self.given = known.frames, known.scans.frames, given
         self.corners = corners_mm(self.lumen.distance)

@@ -95,13 +95,11 @@ def simulated_rivals(
 
 def variant_wires(run: Context, known: Known, way: SimulatedVariant) -> Wires:
     """The wires under one of ``variants_of``; none where the solver has no such wire, as of five times a sharp bend."""
-    case, lumen, clamp, frames = run.case, known.lumen, known.clamp, simulated_frames(known)
-    assert lumen is not None
-    assert clamp is not None
+    case, frames = run.case, simulated_frames(known)
     settings = run.config.solver.quick(known.segment_mm)
     catheter = case.catheter if way.catheter else None
     try:
-        insertion = insertion_of(case.wire, case.wall, lumen, clamp, settings, way.config, catheter)
+        insertion = insertion_of(case.wire, case.wall, known.vessel, known.held, settings, way.config, catheter)
     except ValueError:
         return [None] * len(frames)
     whole = replace(way_of(run, known.frames, frames).turned(way.turn_deg), sheathed=catheter is not None)
