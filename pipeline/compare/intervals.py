@@ -96,6 +96,13 @@ def of_log_ratio(over: Array, under: Array, points: Array, *, rest: Array | None
     return _bounded(holding(plain, low, high))
 
 
+def root_ratio(over: Array, under: Array, points: Array) -> tuple[float, float, float]:
+    """Root of the sum of ``over`` / the sum of ``under``, with its interval: arguments as ``of_log_ratio``."""
+    total = np.maximum([over.sum(), under.sum()], points.sum() * SMALLEST_MM2)
+    value = float(np.sqrt(total[0] / total[1]))
+    return value, *holding(value, *np.exp(0.5 * np.array(of_log_ratio(over, under, points))).tolist())
+
+
 def _log_of_totals(over: Array, under: Array) -> float:
     """log(sum of ``over`` / sum of ``under``) without a lower limit: infinite with one sum of 0, NaN with two."""
     with np.errstate(divide="ignore", invalid="ignore"):

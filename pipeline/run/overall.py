@@ -232,10 +232,7 @@ def _of_squares(frames: Sequence[Scored], before: Array, after: Array) -> tuple[
         return (float("nan"),) * 3
     # wires of other lengths have other numbers of points: both runs' mean squares are weighted by those of ``after``
     points = np.array([float(len(frame.error_mm)) for frame in frames])
-    under, over, weights = by_insertion(frames, before * points, after * points, points)
-    low, high = np.exp(0.5 * np.array(intervals.of_log_ratio(over, under, weights)))
-    total = np.maximum([over.sum(), under.sum()], intervals.SMALLEST_MM2)
-    return float(np.sqrt(total[0] / total[1])), float(low), float(high)
+    return intervals.root_ratio(*by_insertion(frames, after * points, before * points, points))
 
 
 def skill_beside(before: Sequence[Found], after: Sequence[Found], null: str) -> dict[str, float]:

@@ -250,13 +250,10 @@ def _lead(first: Sequence[Piece], second: Sequence[Piece]) -> dict[str, Any]:
     names = [n for n in dict.fromkeys(p.insertion for p in first) if any(p.insertion == n for p in second)]
     sums = [[[p for p in pieces if p.insertion == n] for n in names] for pieces in (first, second)]
     points = np.array([float(sum(p.points for p in mine)) for mine in sums[0]])
-    under, over = (
+    nearest, following = (
         np.array([sum(p.squares for p in mine) / sum(p.points for p in mine) for mine in of]) * points for of in sums
     )
-    least = np.maximum([under.sum(), over.sum()], points.sum() * intervals.SMALLEST_MM2)
-    value = float(np.sqrt(least[0] / least[1]))
-    ends = np.exp(0.5 * np.array(intervals.of_log_ratio(under, over, points)))
-    low, high = intervals.holding(value, *map(float, ends))
+    value, low, high = intervals.root_ratio(nearest, following, points)
     if abs(value - 1.0) < 1e-6:
         verdict = "tie"
     else:
