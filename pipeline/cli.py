@@ -150,6 +150,8 @@ def carried_out(args: argparse.Namespace) -> int:
             if isinstance(path, Path):
                 status_of(path)  # a name that cannot be one is refused here, whatever it was to be
     problems = remove_summaries(args)
+    if (jobs := getattr(args, "jobs", 1)) < 1:
+        problems.append(f"-j {jobs}: expected 1 or more")
     out, junit = getattr(args, "out", None), getattr(args, "junit", None)
     if out is not None:
         problems += unwritable(Path(out), "OUT" if args.command == "report" else "-o", folder=True)

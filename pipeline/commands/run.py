@@ -220,8 +220,6 @@ def _limits(args: argparse.Namespace) -> "Limits":
         raise UsageError([f"--until {args.until!r}: {did_you_mean(args.until, STAGES)}"])
     if args.resume and args.fresh:
         raise UsageError(["--resume and --fresh: keep what fits, or compute again; give one of them"])
-    if args.jobs < 1:
-        raise UsageError([f"-j {args.jobs}: expected 1 or more"])
     if args.executor and not ADDRESS.fullmatch(args.executor):
         raise UsageError(
             [f"--executor {args.executor!r}: expected the address of a dask scheduler, as tcp://host:8786"]

@@ -146,8 +146,6 @@ def _plans(args: argparse.Namespace) -> "dict[str, Plan]":
     from reports.simulators import folders_in
 
     manifest, settings = read_manifest(file_of(args.manifest)), resolved_settings(args)
-    if args.jobs < 1:
-        raise UsageError([f"-j {args.jobs}: expected 1 or more"])
     if args.out.exists() and any(args.out.iterdir()) and not (args.out / "simulators").is_dir():
         raise UsageError([f"-o {args.out}: it is not empty and holds no score; name another folder"])
     names = named(args.curves)

@@ -87,9 +87,7 @@ def _problems(args: Namespace) -> list[str]:
         return ["give one of NAME (--list shows them), --anatomy FILE and --background VOLUME"]
     if args.name is not None and args.name not in catalogue.names():
         return [f"no scene {args.name!r}; {did_you_mean(args.name, catalogue.names())}"]
-    if args.insertions < 1 or args.jobs < 1:
-        return [f"--insertions {args.insertions} -j {args.jobs}: expected 1 or more"]
-    if args.insertions > MOST_INSERTIONS:
+    if not 1 <= args.insertions <= MOST_INSERTIONS:
         return [f"--insertions: expected 1 to {MOST_INSERTIONS}"]
     if args.name is None and args.scanner != "psf":
         return [f"--scanner {args.scanner}: only the catalogue's scenes can be scanned so; leave it out"]

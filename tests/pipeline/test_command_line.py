@@ -107,6 +107,7 @@ TOO_LONG = (
         (f"run STUDY -o y --shard 1/{'9' * 400}", "expected I/N with 1 <= I <= N, as in 3/20"),
         ("run STUDY -o EMPTY", "an empty argument"),
         ("run STUDY -o y -j x", "-j 'x': expected a whole number"),
+        ("report STUDY -j 0", "-j 0: expected 1 or more"),
         ("run STUDY -o y --case-timeout 1m", "--case-timeout '1m': expected a number of seconds, as 60"),
         ("run STUDY -o y --case-memory 2G", "--case-memory '2G': expected a number of MiB, as 2048"),
         ("score STUDY -o y --curve mine=x", "--curve: not an option of wireval score; did you mean '--curves'?"),

@@ -819,7 +819,6 @@ def test_points_cut_short_hide_no_other_case(out: Path, capsys: pytest.CaptureFi
         (["--shard", "3/2"], "expected I/N"),
         (["--shard", "\u00b2/3"], "expected I/N"),
         (["--until", "simulat"], "did you mean 'simulate'"),
-        (["-j", "0"], "expected 1 or more"),
         (["--sweep", "simulate.wall_scale"], "write table.key=value1,value2"),
     ],
 )
