@@ -85,7 +85,7 @@ def of_values() -> Iterator[Made]:
 
 
 def of_places() -> Iterator[Made]:
-    yield "dicom, a slice missing", series(skip=(4,)), "!missing slices", {}
+    yield "dicom, a slice missing", series(skip=(4,)), "!missing slices: 1 of 7 gaps differ from 0.700 mm", {}
     yield "dicom, a slice twice", series(place=lambda k: ORIGIN + [0, 0, 0.7 * (k - (k == 4))]), "!repeated", {}
     yield "dicom, tilted", series(place=lambda k: ORIGIN + [0, 0.5 * k, 0.7 * k]), "!gantry tilt", {}
     long = np.repeat(VALUES, 15, axis=2)

@@ -14,11 +14,11 @@ from tests.studies.formats.base import KINDS, TURN, Variant, by_itk, changed, cu
 def itk_variants() -> Iterator[Variant]:
     for suffix in ("mha", "mhd", "nrrd", "nhdr", "nii", "nii.gz", "hdr"):
         yield Variant(f"{suffix}, plain", by_itk(f"a.{suffix}"))
-        for kind in KINDS:
-            top = 120 if kind in ("int8", "uint8") else 1000
-            yield Variant(f"{suffix}, {kind}", by_itk(f"a.{suffix}", kind=kind), values=numbered(top))
-    for suffix in ("mha", "mhd", "nrrd", "nhdr"):
-        yield Variant(f"{suffix}, packed", by_itk(f"a.{suffix}", compress=True))
+        for packed in (False, True) if suffix in ("mha", "mhd", "nrrd", "nhdr") else (False,):
+            for kind in KINDS:
+                top, read = 120 if kind in ("int8", "uint8") else 1000, "int32" if kind == "uint32" else kind
+                write = by_itk(f"a.{suffix}", kind=kind, compress=packed)
+                yield Variant(f"{suffix}, {'packed ' * packed}{kind}", write, values=numbered(top), kind=read)
     for angle in (3.0, 30.0):
         c, s = np.cos(np.radians(angle)), np.sin(np.radians(angle))
         turn = np.array([[1.0, 0, 0], [0, c, -s], [0, s, c]]) @ TURN
