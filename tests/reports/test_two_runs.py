@@ -60,6 +60,14 @@ def times(out: Path, factor: float) -> None:
             tables.write(folder / file, table, rows)
 
 
+def raised(out: Path, frame: int, column: str, by: float) -> None:
+    """One number of one frame of case b, made larger."""
+    path = out / "cases" / "b" / ERRORS.file
+    rows = tables.read(path, ERRORS)
+    rows.loc[frame, column] += by
+    tables.write(path, ERRORS, rows)
+
+
 @pytest.fixture
 def second(first: Path, tmp_path: Path) -> Path:
     return shutil.copytree(first, tmp_path / "second")
@@ -129,11 +137,8 @@ def test_what_the_manifests_state_otherwise_is_said(
 def test_the_verdict_follows_what_differs_and_ends_the_text(
     first: Path, second: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    for frame, off in ((1, 1.0), (2, 3.0)):
-        path = second / "cases" / "b" / ERRORS.file
-        rows = tables.read(path, ERRORS)
-        rows.loc[frame, "tip_mm"] += off
-        tables.write(path, ERRORS, rows)
+    raised(second, 1, "tip_mm", 1.0)
+    raised(second, 2, "tip_mm", 3.0)
     path = second / "cases" / "b" / "result.json"
     result = json.loads(path.read_text(encoding="utf-8"))
     result["provenance"]["git_commit"] = "0123abc"
@@ -160,10 +165,7 @@ def test_one_number_that_became_worse_does_not_hide_that_the_errors_are_smaller(
 ) -> None:
     """A calibration that made every error three times smaller was WORSE, for a penetration, and nothing else."""
     times(second, 0.3)
-    path = second / "cases" / "b" / ERRORS.file
-    rows = tables.read(path, ERRORS)
-    rows.loc[1, "max_penetration_mm"] += 0.5
-    tables.write(path, ERRORS, rows)
+    raised(second, 1, "max_penetration_mm", 0.5)
     assert main(["diff", str(first), str(second), "-q"]) == 1
     said = capsys.readouterr().out
     assert said.startswith(
@@ -222,10 +224,7 @@ def test_small_changes_of_every_frame_close_the_gate_over_all(first: Path, secon
 
 
 def test_a_frame_that_became_worse_stands_in_every_file(first: Path, second: Path, tmp_path: Path) -> None:
-    path = second / "cases" / "b" / ERRORS.file
-    rows = tables.read(path, ERRORS)
-    rows.loc[2, "tip_mm"] += 1.0
-    tables.write(path, ERRORS, rows)
+    raised(second, 2, "tip_mm", 1.0)
     (second / "cases" / "b" / "report.html").touch()
     files = {kind: tmp_path / f"diff.{kind}" for kind in ("json", "markdown", "junit", "html")}
     asked = [word for kind, file in files.items() for word in (f"--{kind}", str(file))]
@@ -249,10 +248,7 @@ def test_a_frame_that_became_worse_stands_in_every_file(first: Path, second: Pat
 def test_a_depth_that_moved_closes_the_gate_and_is_not_called_worse(
     first: Path, second: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    path = second / "cases" / "b" / ERRORS.file
-    rows = tables.read(path, ERRORS)
-    rows.loc[2, "insertion_mm"] += 1.0
-    tables.write(path, ERRORS, rows)
+    raised(second, 2, "insertion_mm", 1.0)
     assert main(["diff", "-q", str(first), str(second), "--junit", str(tmp_path / "diff.xml")]) == 1
     said = capsys.readouterr().out
     assert said == "MOVED: 3 cases compared: no regression; 1 value has moved: insertion_mm\n"
