@@ -24,16 +24,17 @@ from pipeline.study.first_wire import AT_EDGE, IN_PLACE, MOVED_IN, infer_entry
 from pipeline.study.infer import _deeper, _order, _scans_in, infer_manifest
 from pipeline.study.manifest import ManifestError, read_manifest
 from pipeline.study.same_scans import repeated
-from tests.pipeline.test_load import SPACING, image_of, numbered
+from tests.pipeline.test_load import numbered
 from tests.pipeline.test_manifest import GOOD
 from tests.studies.formats import variants
+from tests.studies.formats.base import SPACING, image
 
 
 def test_voxels_of_a_detached_file_belong_to_the_key_of_a_crop(tmp_path: Path) -> None:
     """New .raw, same header: another scan."""
     keys = []
     for values in (numbered(), numbered() + 1):
-        sitk.WriteImage(image_of(values), str(tmp_path / "a.mhd"))
+        sitk.WriteImage(image(values), str(tmp_path / "a.mhd"))
         header = read_header(tmp_path / "a.mhd")
         keys.append(digest(Crop(header, header.box)))
     assert keys[0] != keys[1]
@@ -104,7 +105,7 @@ def test_frames_whose_headers_are_alike_are_one_scan_only_where_their_voxels_are
     """The header of a NIfTI pair names no file: of one grid, all frames but the first were refused as copies."""
     (tmp_path / "frames").mkdir()
     for name, values in (("a", numbered()), ("b", numbered() + 1), ("c", numbered())):
-        sitk.WriteImage(image_of(values), str(tmp_path / "frames" / f"{name}.hdr"))
+        sitk.WriteImage(image(values), str(tmp_path / "frames" / f"{name}.hdr"))
     (tmp_path / "m.toml").write_text(GOOD.replace("frames/*.mha", "frames/*.hdr"), encoding="utf-8")
     assert [text.split(": ")[0] for text in repeated(read_manifest(tmp_path / "m.toml").cases[0])] == [
         str(tmp_path / "frames" / "c.hdr")
@@ -177,7 +178,7 @@ def test_a_reference_of_several_volumes_is_refused(tmp_path: Path) -> None:
 
 def test_uint16_beyond_32767_is_not_folded(tmp_path: Path) -> None:
     """What stages subtract is two bytes with a sign."""
-    sitk.WriteImage(image_of((numbered() * 70).astype(np.uint16)), str(tmp_path / "a.mha"))
+    sitk.WriteImage(image(numbered() * 70, "uint16"), str(tmp_path / "a.mha"))
     values = load(read_header(tmp_path / "a.mha")).values
     assert values.dtype == np.int32
     assert values.max() == numbered().astype(int).max() * 70
@@ -221,7 +222,7 @@ def test_everything_that_is_wrong_with_the_files_of_a_case_is_said_at_once(tmp_p
     (tmp_path / "frames").mkdir()
     for k, text in enumerate(("0 0.5 0.7", "0.4 0.5 0.7", "nan 0.5 0.7")):
         path = tmp_path / "frames" / f"f_{k}.mha"
-        sitk.WriteImage(image_of(numbered()), str(path), useCompression=False)
+        sitk.WriteImage(image(), str(path), useCompression=False)
         raw = path.read_bytes()
         at = raw.index(b"ElementSpacing")
         path.write_bytes(raw[:at] + f"ElementSpacing = {text}".encode() + raw[raw.index(b"\n", at) :])

@@ -21,23 +21,12 @@ from pipeline.load.config import LoadConfig
 from pipeline.load.files import parts as file_parts
 from pipeline.run.hashing import file_hash
 from pipeline.study.infer import infer_manifest
-
-SPACING, ORIGIN = (0.4, 0.5, 0.7), (12.0, -30.0, 5.0)
-TURN = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+from tests.studies.formats import base
+from tests.studies.formats.base import ORIGIN, SPACING, TURN, image
 
 
 def numbered() -> np.ndarray:
-    """values[x, y, z] = x + 10 y + 100 z on an asymmetric grid: any swap of axes shows."""
-    x, y, z = np.meshgrid(np.arange(5), np.arange(7), np.arange(9), indexing="ij")
-    return (x + 10 * y + 100 * z).astype(np.int16)
-
-
-def image_of(values: np.ndarray, direction: np.ndarray = TURN) -> sitk.Image:
-    image = sitk.GetImageFromArray(np.ascontiguousarray(values.T))
-    image.SetSpacing(SPACING)
-    image.SetOrigin(ORIGIN)
-    image.SetDirection(direction.ravel().tolist())
-    return image
+    return base.numbered().astype(np.int16)
 
 
 @pytest.mark.parametrize(
@@ -65,7 +54,7 @@ def test_numbered_files_that_cannot_be_meant_are_refused(words: str) -> None:
 
 
 def test_what_a_crop_reads_is_counted(tmp_path: Path) -> None:
-    sitk.WriteImage(image_of(numbered()), str(tmp_path / "scan.mha"))
+    sitk.WriteImage(image(), str(tmp_path / "scan.mha"))
     counted = Crop(read_header(tmp_path / "scan.mha"), ((1, 2, 3), (4, 6, 8))).counters
     assert counted == {"voxels_total": 315.0, "voxels_read": 60.0, "voxels_skipped": 255.0}
 
@@ -74,7 +63,7 @@ def test_what_a_crop_reads_is_counted(tmp_path: Path) -> None:
 def test_what_follows_packed_voxels_is_seen_wherever_a_crop_ends(tmp_path: Path, suffix: str) -> None:
     """Crops, which frames are read as, ended before it: 5000 bytes of something else passed."""
     path, box = tmp_path / f"scan{suffix}", ((1, 0, 2), (4, 5, 6))
-    sitk.WriteImage(image_of(numbered()), str(path), useCompression=True)
+    sitk.WriteImage(image(), str(path), useCompression=True)
     raw = path.read_bytes()
     begin = raw.index(b"\x1f\x8b\x08")
     voxels = gzip.decompress(raw[begin:])
@@ -159,10 +148,10 @@ def test_what_follows_a_bzip2_stream_is_seen_wherever_a_crop_ends(tmp_path: Path
 def test_files_that_hold_a_headers_voxels_are_part_of_it(tmp_path: Path) -> None:
     """An edit of theirs is one of the scan: kept results hang on them."""
     for name in ("a.mhd", "b.nhdr", "c.hdr"):
-        sitk.WriteImage(image_of(numbered()), str(tmp_path / name), useCompression=False)
+        sitk.WriteImage(image(), str(tmp_path / name), useCompression=False)
     for attached, header in (("d.mha", "a.mhd"), ("e.nrrd", "b.nhdr")):
         (tmp_path / attached).write_bytes((tmp_path / header).read_bytes())
-    sitk.WriteImage(image_of(numbered()), str(tmp_path / "whole.mha"), useCompression=False)
+    sitk.WriteImage(image(), str(tmp_path / "whole.mha"), useCompression=False)
     assert file_parts(tmp_path / "whole.mha") == ()
     voxels = {
         "a.mhd": "a.raw",
@@ -182,20 +171,20 @@ def test_files_that_hold_a_headers_voxels_are_part_of_it(tmp_path: Path) -> None
 
 
 def test_a_folder_of_scans_is_told_how_to_be_named(tmp_path: Path) -> None:
-    sitk.WriteImage(image_of(numbered()), str(tmp_path / "f_2.nii.gz"))
+    sitk.WriteImage(image(), str(tmp_path / "f_2.nii.gz"))
     with pytest.raises(LoadError, match=rf"holds scans, as f_2.nii.gz; name these, as in {tmp_path.name}/\*\.nii\.gz"):
         read_header(tmp_path)
 
 
 def test_a_small_scan_is_told_how_small_the_setting_is(tmp_path: Path) -> None:
     """ "asks for 0.0 GiB; allowed: 1e-09"."""
-    sitk.WriteImage(image_of(numbered()), str(tmp_path / "a.mha"))
+    sitk.WriteImage(image(), str(tmp_path / "a.mha"))
     with pytest.raises(LoadError, match=r"asks for [1-9.]+e-0\d GiB; allowed: 1e-09 GiB"):
         read_header(tmp_path / "a.mha", LoadConfig(most_gib=1e-9))
 
 
 def test_a_pair_in_capitals_is_a_pair(tmp_path: Path) -> None:
-    sitk.WriteImage(image_of(numbered()), str(tmp_path / "a.hdr"), useCompression=False)
+    sitk.WriteImage(image(), str(tmp_path / "a.hdr"), useCompression=False)
     header, voxels = ((tmp_path / f"a{end}").rename(tmp_path / f"A{end.upper()}") for end in (".hdr", ".img"))
     for path, other in ((header, voxels), (voxels, header)):
         np.testing.assert_array_equal(load(read_header(path)).values, numbered())
@@ -229,7 +218,7 @@ def test_a_format_from_outside_says_what_else_belongs_to_its_files(
 
 
 def test_loaded_voxels_outlive_the_image_that_holds_them(tmp_path: Path) -> None:
-    sitk.WriteImage(image_of(numbered()), str(tmp_path / "scan.mha"))
+    sitk.WriteImage(image(), str(tmp_path / "scan.mha"))
     volumes = [load(read_header(tmp_path / "scan.mha")) for _ in range(3)]
     others = [sitk.Image(5, 7, 9, sitk.sitkInt16) + 77 for _ in range(20)]  # would land in freed memory
     for volume in volumes:
@@ -281,17 +270,12 @@ def test_an_hdf5_dataset_without_spacing_names_what_is_missing(tmp_path: Path) -
         read_header(Source(path, "/wrong"))
 
 
-@pytest.mark.parametrize(
-    ("damage", "found"), [(lambda path: path.write_bytes(path.read_bytes()[:500]), "truncated"), (None, "3 numbers")]
-)
-def test_a_damaged_hdf5_file_is_said(tmp_path: Path, damage: object, found: str) -> None:
+def test_a_damaged_hdf5_file_is_said(tmp_path: Path) -> None:
     path = tmp_path / "study.h5"
     with h5py.File(path, "w") as file:
-        spacing = SPACING if damage else SPACING[:2]
-        file.create_dataset("volume", data=numbered().T).attrs["spacing_mm"] = spacing
-    if callable(damage):
-        damage(path)
-    with pytest.raises(LoadError, match=rf"study\.h5: .*({found}).*Check that the file is complete"):
+        file.create_dataset("volume", data=numbered().T).attrs["spacing_mm"] = SPACING
+    path.write_bytes(path.read_bytes()[:500])
+    with pytest.raises(LoadError, match=r"study\.h5: .*truncated.*Check that the file is complete"):
         read_header(path)
 
 
@@ -301,7 +285,7 @@ def write_series(folder: Path, values: np.ndarray, positions: list[tuple[float, 
     writer.KeepOriginalImageUIDOn()
     for k, position in enumerate(positions):
         plane = sitk.GetImageFromArray(np.ascontiguousarray(values[:, :, k].T))
-        plane.SetSpacing(SPACING[:2])
+        plane.SetSpacing(SPACING[:2].tolist())
         tags = {
             "0008|0060": "CT", "0020|000e": "1.2.3.4", "0020|000d": "1.2.3", "0008|0018": f"1.2.3.4.{k + 1}",
             "0008|0016": "1.2.840.10008.5.1.4.1.1.2", "0020|0013": str(k + 1),
@@ -367,17 +351,17 @@ def test_a_tilted_stack_is_refused_or_straightened_never_sheared(tmp_path: Path)
 
 def test_two_series_in_a_folder_are_listed(tmp_path: Path) -> None:
     write_series(tmp_path / "series", numbered(), straight_stack())
-    image = sitk.ReadImage(str(next((tmp_path / "series").iterdir())))
-    image.SetMetaData("0020|000e", "9.9.9")
-    image.SetMetaData("0008|103e", "Series 10")
+    one = sitk.ReadImage(str(next((tmp_path / "series").iterdir())))
+    one.SetMetaData("0020|000e", "9.9.9")
+    one.SetMetaData("0008|103e", "Series 10")
     writer = sitk.ImageFileWriter()
     writer.KeepOriginalImageUIDOn()
     writer.SetFileName(str(tmp_path / "series" / "other.dcm"))
-    writer.Execute(image)
-    image.SetMetaData("0020|000e", "9.9.10")
-    image.SetMetaData("0008|103e", "Series 9")
+    writer.Execute(one)
+    one.SetMetaData("0020|000e", "9.9.10")
+    one.SetMetaData("0008|103e", "Series 9")
     writer.SetFileName(str(tmp_path / "series" / "third.dcm"))
-    writer.Execute(image)
+    writer.Execute(one)
     with pytest.raises(LoadError, match="found 3 DICOM image series") as told:
         read_header(tmp_path / "series")
     assert "Series 9 (9.9.10): 1 files\n    Series 10 (9.9.9): 1 files" in str(told.value)
@@ -402,34 +386,31 @@ def test_what_is_not_there_or_no_scan_is_said(tmp_path: Path) -> None:
         read_header(tmp_path / "capitals")
 
 
-def test_two_slices_are_a_volume_and_one_is_none(tmp_path: Path) -> None:
-    for count in (1, 2):
-        sitk.WriteImage(image_of(numbered()[:, :, :count]), str(tmp_path / f"{count}.mha"))
+def test_two_slices_are_a_volume(tmp_path: Path) -> None:
+    sitk.WriteImage(image(numbered()[:, :, :2]), str(tmp_path / "2.mha"))
     assert load(read_header(tmp_path / "2.mha")).values.shape == (5, 7, 2)
-    with pytest.raises(LoadError, match="one slice is no volume"):
-        read_header(tmp_path / "1.mha")
 
 
-NO_GREYS = [(np.float64, np.nan), (np.float64, -np.inf), (np.float64, 1e20), (np.float64, 1e300)]
-NO_GREYS += [(np.int32, -(2.0**31)), (np.int32, 2.0**31 - 1)]
+NO_GREYS = [("float64", np.nan), ("float64", -np.inf), ("float64", 1e20), ("float64", 1e300)]
+NO_GREYS += [("int32", -(2.0**31)), ("int32", 2.0**31 - 1)]
 
 
 @pytest.mark.parametrize(("kind", "grey"), NO_GREYS)
-def test_voxels_that_are_no_grey_are_refused(tmp_path: Path, kind: type, grey: float) -> None:
+def test_voxels_that_are_no_grey_are_refused(tmp_path: Path, kind: str, grey: float) -> None:
     """Squares of 1e20 overflowed, and no frame of its case had a result; whole numbers were not asked."""
     values = numbered().astype(kind)
     values[1, 2, 3] = grey
-    sitk.WriteImage(image_of(values), str(tmp_path / "scan.mha"))
+    sitk.WriteImage(image(values, kind), str(tmp_path / "scan.mha"))
     with pytest.raises(LoadError, match="1 voxels are NaN, infinite or beyond 1e"):
         load(read_header(tmp_path / "scan.mha"))
 
 
 @pytest.mark.parametrize(("change", "accepted"), [(1e-8, True), (0.05, True), (0.3, False)])
 def test_geometry_is_compared_in_voxels_at_the_far_corner(tmp_path: Path, change: float, accepted: bool) -> None:
-    first, second = image_of(numbered()), image_of(numbered())
+    first, second = image(), image()
     second.SetOrigin((ORIGIN[0] + change, *ORIGIN[1:]))
-    for name, image in (("a", first), ("b", second)):
-        sitk.WriteImage(image, str(tmp_path / f"{name}.mha"))
+    for name, scan in (("a", first), ("b", second)):
+        sitk.WriteImage(scan, str(tmp_path / f"{name}.mha"))
     headers = [read_header(tmp_path / f"{name}.mha") for name in "ab"]
     if accepted:
         require_same_geometry(*headers)
@@ -439,11 +420,11 @@ def test_geometry_is_compared_in_voxels_at_the_far_corner(tmp_path: Path, change
 
 
 def test_a_spacing_from_the_manifest_is_reported_as_assumed(tmp_path: Path) -> None:
-    sitk.WriteImage(image_of(numbered()), str(tmp_path / "scan.mha"))
+    sitk.WriteImage(image(), str(tmp_path / "scan.mha"))
     header = read_header(tmp_path / "scan.mha", spacing_mm=(0.5, 0.5, 0.5))
     np.testing.assert_array_equal(header.spacing_mm, 0.5)
     assert f"taken from the manifest, where the file has {np.round(SPACING, 4).tolist()}" in header.assumed[0]
-    same = read_header(tmp_path / "scan.mha", spacing_mm=SPACING)
+    same = read_header(tmp_path / "scan.mha", spacing_mm=(0.4, 0.5, 0.7))
     assert same.assumed[-1].endswith("taken from the manifest")
 
 
@@ -477,7 +458,7 @@ def test_the_real_tilted_head_is_refused_or_resampled(real_data: Path, tmp_path:
 def test_a_rounded_quaternion_is_a_rotation_all_the_same(tmp_path: Path) -> None:
     """b = 1.0004, rounded by its writer: half a turn about x, lengths unchanged."""
     path = tmp_path / "scan.nii"
-    sitk.WriteImage(image_of(numbered(), np.diag([1.0, -1.0, -1.0])), str(path))
+    sitk.WriteImage(image(turn=np.diag([1.0, -1.0, -1.0])), str(path))
     data = bytearray(path.read_bytes())
     data[252:256] = struct.pack("<hh", 1, 0)  # the qform alone
     data[256:268] = struct.pack("<fff", 1.0004, 0.0, 0.0)
@@ -489,6 +470,6 @@ def test_a_rounded_quaternion_is_a_rotation_all_the_same(tmp_path: Path) -> None
 
 def test_corners_are_the_outermost_voxels_centres(tmp_path: Path) -> None:
     path = tmp_path / "scan.mha"
-    sitk.WriteImage(image_of(numbered()), str(path))
+    sitk.WriteImage(image(), str(path))
     grid = read_header(path).grid
-    np.testing.assert_allclose(np.ptp(corners_mm(grid) @ TURN, axis=0), np.array(SPACING) * (4, 6, 8))
+    np.testing.assert_allclose(np.ptp(corners_mm(grid) @ TURN, axis=0), SPACING * (4, 6, 8))

@@ -10,7 +10,8 @@ import pytest
 from pipeline.load import LoadError, load, read_header
 from pipeline.load.config import LoadConfig
 from tests.pipeline.enhanced_dicom import enhanced
-from tests.pipeline.test_load import ORIGIN, SPACING, numbered, straight_stack
+from tests.pipeline.test_load import numbered, straight_stack
+from tests.studies.formats.base import ORIGIN, SPACING
 
 
 @pytest.mark.parametrize("implicit", [False, True])
