@@ -109,10 +109,8 @@ class Evidence:
             away = trace.points_mm - here
             across.append(away - np.sum(away * tangent, axis=1)[:, None] * tangent)
             push.append(wire.push_force_N)
-        force = np.array(push) if self.trial.force_N is None else self.trial.force_N - np.array(push)
-        return Rows(
-            np.concatenate(across), force if self.trial.force_N is not None else np.full(len(wires), np.nan), rests
-        )
+        measured = np.nan if self.trial.force_N is None else self.trial.force_N
+        return Rows(np.concatenate(across), measured - np.array(push), rests)
 
     def slopes(
         self, wires: Sequence[Solution], moved: Sequence[Solution], points: tuple[Point, Point], step: float

@@ -46,17 +46,22 @@ def fitted(free: Sequence[Unknown], evidence: Sequence[Evidence], solver: Solver
     slippery = tuple(u for u in free if u.name not in (FRICTION, BENDING))
     first = Problem(slippery, {FRICTION: 0.0}, tuple(evidence), solver)
     followed = [first.solved(x, FIRST_ROUNDS) for x in _starts(first)]
-    # each solution has a scale of its own: their objectives are compared at a common one
-    scale = min(one.scale for one in followed)
-    ends = first.residuals([one.x for one in followed], first.even, scale)
-    values = [first.value(one.x, r) for one, r in zip(followed, ends, strict=True)]
-    best = followed[int(np.argmin(values))]
+    best, starts = _best(first, followed, [u.name for u in slippery].index(ROLL))
     whole = Problem(tuple(free), {}, tuple(evidence), solver)
     known = dict(zip((u.name for u in slippery), best.x, strict=False))
     begin = [known.get(u.name, max(u.prior, FIRST_FRICTION) if u.name == FRICTION else u.prior) for u in free]
-    solved = whole.solved(np.concatenate([begin, best.x[len(slippery) :]]))
-    rolls = [one.x[[u.name for u in slippery].index(ROLL)] for one in followed]
-    return Fit(whole, solved, tuple((float(r), float(v)) for r, v in zip(rolls, values, strict=True)))
+    return Fit(whole, whole.solved(np.concatenate([begin, best.x[len(slippery) :]])), starts)
+
+
+def _best(problem: Problem, solved: Sequence[Linear], roll: int) -> tuple[Linear, tuple[tuple[float, float], ...]]:
+    """The solution of least objective, and of each its roll, the entry ``roll`` of a vector, and its objective.
+
+    Each has a scale of its own: they are compared at a common one.
+    """
+    ends = problem.residuals([one.x for one in solved], problem.even, min(one.scale for one in solved))
+    values = [problem.value(one.x, r) for one, r in zip(solved, ends, strict=True)]
+    starts = tuple((float(one.x[roll]), value) for one, value in zip(solved, values, strict=True))
+    return solved[int(np.argmin(values))], starts
 
 
 def held_at_prior(fit: Fit, names: Sequence[str]) -> Fit:
@@ -75,12 +80,7 @@ def roll_fitted(one: Evidence, friction: float, solver: SolverConfig) -> Fit:
     means, _ = problem.prior
     xs = [np.where(np.arange(len(means)) == OWN - 1, roll, means) for roll in ROLLS_DEG]
     found = np.array([float(own[0] @ own[0]) for own in still.residuals(xs, still.even, 1.0)])
-    solved = [problem.solved(xs[k]) for k in _valleys(found)]
-    scale = min(one.scale for one in solved)
-    ends = problem.residuals([one.x for one in solved], problem.even, scale)
-    values = [problem.value(one.x, r) for one, r in zip(solved, ends, strict=True)]
-    starts = [(float(one.x[OWN - 1]), float(value)) for one, value in zip(solved, values, strict=True)]
-    return Fit(problem, solved[int(np.argmin(values))], tuple(starts))
+    return Fit(problem, *_best(problem, [problem.solved(xs[k]) for k in _valleys(found)], OWN - 1))
 
 
 @dataclass(frozen=True)
