@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from pipeline.arrays.grids import MAD, spelt
+from pipeline.arrays.grids import spelt
 from pipeline.model import Array
 from pipeline.register.left import Left
 from pipeline.register.patches import PATCH_POINTS, TINY, means, products, shaded, spread_out
-from pipeline.register.shift import TUKEY, StaticPoints
+from pipeline.register.shift import StaticPoints, bisquare
 
 ROUNDS = 2
 """Times that a patch's shift is found; the weights against metal are worked out anew between them."""
@@ -120,8 +120,7 @@ def _shifts(s: StaticPoints, left: Left) -> tuple[Array, NDArray[np.bool_]]:
         shift = _shown(normal, right)
         shades = np.einsum("kij,kj->ki", shade, np.column_stack([-shift, np.ones(len(shift))]))
         residual = grey - np.sum(design * spread_out(shift, s.starts, count), axis=1) - s.shade(shades)
-        scale = MAD * float(np.median(np.abs(residual[used]))) + TINY
-        weights = used * np.clip(1.0 - (residual / (TUKEY * scale)) ** 2, 0.0, None) ** 2
+        weights, _ = bisquare(residual, used)
     return shift, np.add.reduceat(weights, s.starts) > 0.5 * PATCH_POINTS
 
 

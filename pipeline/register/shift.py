@@ -171,6 +171,12 @@ def _seen(normal: Array, right: Array, least: float) -> Array:
     return np.asarray(axes @ np.where(shown, axes.T @ right / np.where(shown, power, 1.0), 0.0))
 
 
+def bisquare(residual: Array, used: NDArray[np.bool_]) -> tuple[Array, float]:
+    """Tukey's weights (n,) of residuals (n,) and their scale (sd); points not ``used`` have no say in either."""
+    scale = MAD * float(np.median(np.abs(residual[used]))) + TINY
+    return used * np.clip(1.0 - (residual / (TUKEY * scale)) ** 2, 0.0, None) ** 2, scale
+
+
 def _reweighted(s: StaticPoints, design: Array, grey: Array, used: NDArray[np.bool_]) -> Solved:
     """Robust solution of design @ x = grey, but for each patch's gain and offset; points not ``used`` have no say."""
     weights, scale = used.astype(float), 0.0
@@ -182,8 +188,7 @@ def _reweighted(s: StaticPoints, design: Array, grey: Array, used: NDArray[np.bo
         shades = shade @ np.append(-solution, 1.0)
         change = design @ solution
         residual = grey - change - s.shade(shades)
-        scale = MAD * float(np.median(np.abs(residual[used]))) + TINY
-        weights = used * np.clip(1.0 - (residual / (TUKEY * scale)) ** 2, 0.0, None) ** 2
+        weights, scale = bisquare(residual, used)
     return Solved(solution, change, shades[:, 1], residual, scale, used)
 
 

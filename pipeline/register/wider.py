@@ -8,11 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pipeline.arrays.grids import MAD, spread
+from pipeline.arrays.grids import spread
 from pipeline.model import Array
 from pipeline.register.left import Left
 from pipeline.register.patches import TINY, products, shaded
-from pipeline.register.shift import TUKEY, StaticPoints
+from pipeline.register.shift import StaticPoints, bisquare
 
 ROUNDS = 3
 """Times that it is found; the weights are worked out anew between them."""
@@ -76,8 +76,7 @@ def wider(s: StaticPoints, left: Left, brighter: float) -> Wider:
         power, right, shade = shaded(products(rows, weights, s.starts))
         found = float(right.sum() / (power.sum() + TINY))
         residual = grey - outward * found - s.shade(shade @ np.array([-found, 1.0]))
-        scale = MAD * float(np.median(np.abs(residual[clear]))) + TINY
-        weights = clear * np.clip(1.0 - (residual / (TUKEY * scale)) ** 2, 0.0, None) ** 2
+        weights, _ = bisquare(residual, clear)
     return Wider(found, _sd(power[:, 0, 0], right[:, 0]), s.voxel_mm)
 
 
