@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
-from pipeline.model import Curve
+from pipeline.model import Curve, Lumen
 from pipeline.run.stages.known import Frame
+from pipeline.run.stages.thickness import not_too_thick
 from pipeline.trace.steps import Steps
 from pipeline.trace.whose_end import of_one_device, of_one_line
+from solver.grid import Grid
 
 IMAGE: Any = SimpleNamespace(voxel=0.3, modelled=False, noise_in=lambda _: 0.01)
 
@@ -40,3 +43,9 @@ def with_gap(curve: Curve, beyond_mm: float, gap_mm: float = 3.0) -> Curve:
     from_tip = curve.length_mm - arc
     dark = (from_tip > beyond_mm + 1e-6) & (from_tip < beyond_mm + gap_mm)
     return of_one_line(IMAGE, curve, (arc, np.where(dark, 0.2, 1.0)))
+
+
+def thick(curve: Curve, blur_mm: float) -> Curve:
+    """The curve of a line that looks so wide, judged beside a wire of 0.18 mm radius."""
+    vessel = Lumen(Grid(np.zeros((4, 4, 4)), np.full(3, 0.3)), levels={"scanner_blur_mm": 0.25})
+    return not_too_thick(replace(curve, levels={**curve.levels, "blur_mm": blur_mm}), vessel, 0.18)

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipeline.model import Curve, Lumen
 from pipeline.run.log import Log
 from pipeline.run.stages.depths import (
     drawn_back,
@@ -28,7 +27,6 @@ from pipeline.run.stages.dim_ends import barely_seen, faint_ends, own_dim_ends
 from pipeline.run.stages.gaps import own_gaps
 from pipeline.run.stages.known import Frame
 from pipeline.run.stages.repeated import kept, once
-from pipeline.run.stages.thickness import not_too_thick
 from pipeline.run.stages.trace import _in_step, _last_curve, _Part
 from pipeline.run.stages.way import with_depths
 from pipeline.simulate.clamp import Clamp
@@ -37,8 +35,7 @@ from pipeline.study.settings import Config
 from pipeline.trace import FAINT_BEYOND, GOES_ON, of_catheter, of_length
 from pipeline.trace.config import TraceConfig
 from reports.doubts import Caveats
-from solver.grid import Grid
-from tests.pipeline.doubts import dim, frames, with_gap
+from tests.pipeline.doubts import dim, frames, thick, with_gap
 
 DEPTHS = [10.0, 14.0, 18.0, 22.0, 26.0, 30.0]
 COMMON_MM = 0.17
@@ -324,12 +321,7 @@ LENGTHS = [20.0, 26.0, 32.0, 38.0]
 
 def test_a_rod_with_a_dim_end_of_its_own_is_a_rod() -> None:
     """A rod of 1.1 mm, of 0.36 mm stated, was ok in 4 of 4 frames: its dim end was asked about alone."""
-    vessel = Lumen(Grid(np.zeros((4, 4, 4)), np.full(3, 0.3)), levels={"scanner_blur_mm": 0.25})
-
-    def thick(curve: Curve) -> Curve:
-        return not_too_thick(replace(curve, levels={**curve.levels, "blur_mm": 0.6}), vessel, 0.18)
-
-    found, said = own_dim_ends(dim(LENGTHS, [6.0] * 4, thick), 0.3)
+    found, said = own_dim_ends(dim(LENGTHS, [6.0] * 4, lambda curve: thick(curve, 0.6)), 0.3)
     assert not said
     assert not any(f.ok for f in found)
     assert "mm thick; expected" in found[0].message, "and no word of other depths, which settle nothing here"

@@ -8,17 +8,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.model import Curve, Lumen
+from pipeline.model import Curve
 from pipeline.run.stages.gaps import own_gaps
 from pipeline.run.stages.known import Frame
 from pipeline.run.stages.repeated import once
-from pipeline.run.stages.thickness import not_too_thick
 from pipeline.status import FrameStatus
 from pipeline.trace import BEYOND_GAP, GAP, of_catheter
 from pipeline.trace.whose_end import first_gap_mm
-from solver.grid import Grid
 from tests.later import later
-from tests.pipeline.doubts import frames, with_gap
+from tests.pipeline.doubts import frames, thick, with_gap
 from tests.studies.seeing.render import arc_of
 from tests.studies.seeing.scenes import Draft
 from tests.studies.seeing.table import seen
@@ -115,13 +113,8 @@ def test_a_copy_of_a_frame_is_no_third_with_the_same_gap():
 @pytest.mark.parametrize("beyond", [8.0, 20.0], ids=["a gap that is ok", "a gap that is doubted"])
 def test_frames_with_one_gap_are_refused_for_what_else_is_wrong_with_them(beyond: float):
     """A rod five times as thick as the stated wire was ok, for all frames showed the same gap in it."""
-    vessel = Lumen(Grid(np.zeros((4, 4, 4)), np.full(3, 0.3)), levels={"scanner_blur_mm": 0.25})
-
-    def thick(curve: Curve) -> Curve:
-        return not_too_thick(replace(curve, levels={**curve.levels, "blur_mm": 0.9}), vessel, 0.18)
-
     lengths = [30.0, 36.0, 42.0, 48.0]
-    assert not any(f.ok for f in own_gaps(gapped(lengths, [beyond] * 4, thick), 0.3)[0])
+    assert not any(f.ok for f in own_gaps(gapped(lengths, [beyond] * 4, lambda curve: thick(curve, 0.9)), 0.3)[0])
     # with the catheter's end where the line ends, other depths tell nothing of it either
     ends = gapped(lengths, [beyond] * 4, lambda curve: of_catheter(curve, curve.length_mm))
     assert not any(f.ok for f in own_gaps(ends, 0.3)[0])

@@ -158,18 +158,21 @@ def test_the_curve_lies_on_the_wire_as_closely_as_noise_allows(cnr, mean_bar, ti
     assert not curve.flagged.any()
 
 
+def pulls(curve, wire):
+    """Errors across the wire, in its plane, over what is stated of them; without the ends."""
+    near = cKDTree(wire).query(curve.points_mm)[1]
+    side = np.cross(np.gradient(wire, axis=0)[near], [0.0, 0.0, 1.0])
+    side /= np.linalg.norm(side, axis=1)[:, None]
+    return (np.sum((curve.points_mm - wire[near]) * side, axis=1) / curve.sigma_mm)[2:-6]
+
+
 def test_stated_uncertainty_is_the_spread_of_errors():
     _, _, _, wire, entry, direction = vessel()
-    pulls = []
+    found = []
     for seed in range(3):
         frame, reference, lumen = scans(8, seed)
-        curve = trace(frame, lumen, entry, direction, reference=reference)
-        near = cKDTree(wire).query(curve.points_mm)[1]
-        t = np.gradient(wire, axis=0)[near]
-        side = np.cross(t, [0.0, 0.0, 1.0])
-        side /= np.linalg.norm(side, axis=1)[:, None]
-        pulls.append((np.sum((curve.points_mm - wire[near]) * side, axis=1) / curve.sigma_mm)[2:-6])
-    assert 0.6 < np.concatenate(pulls).std() < 1.5
+        found.append(pulls(trace(frame, lumen, entry, direction, reference=reference), wire))
+    assert 0.6 < np.concatenate(found).std() < 1.5
 
 
 def test_the_curve_turns_with_the_volume():
@@ -208,12 +211,7 @@ def test_without_a_reference_uneven_contrast_neither_moves_the_tip_nor_goes_unst
         assert curve.status is FrameStatus.OK
         assert point_to_curve(curve.points_mm, wire)[0].mean() < 0.06 * VOXEL
         assert np.linalg.norm(curve.points_mm[-1] - wire[-1]) < 0.35 * VOXEL
-        near = cKDTree(wire).query(curve.points_mm)[1]
-        t = np.gradient(wire, axis=0)[near]
-        side = np.cross(t, [0.0, 0.0, 1.0])
-        side /= np.linalg.norm(side, axis=1)[:, None]
-        pull = (np.sum((curve.points_mm - wire[near]) * side, axis=1) / curve.sigma_mm)[2:-6]
-        assert 0.5 < pull.std() < 1.5
+        assert 0.5 < pulls(curve, wire).std() < 1.5
         spread[name] = curve.sigma_mm.mean()
     assert spread["fading"] > spread["even"]
 
