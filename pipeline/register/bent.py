@@ -114,12 +114,12 @@ def _shifts(s: StaticPoints, left: Left) -> tuple[Array, NDArray[np.bool_]]:
     gain, grey, used = left
     count, weights = len(grey), used.astype(float)
     design = -s.voxel_mm * gain[:, None] * s.gradient
-    rows = np.column_stack([design, np.ones(count), s.centred, grey])
+    rows = np.column_stack([design, s.shades, grey])
     for _ in range(ROUNDS):
-        normal, right, shade = shaded(products(rows, weights, s.starts))
+        normal, right, shade = shaded(products(rows, weights, s.starts), 3)
         shift = _shown(normal, right)
         shades = np.einsum("kij,kj->ki", shade, np.column_stack([-shift, np.ones(len(shift))]))
-        residual = grey - np.sum(design * spread_out(shift, s.starts, count), axis=1) - s.shade(shades)
+        residual = grey - np.sum(design * spread_out(shift, s.starts, count), axis=1) - s.shade(shades)[0]
         weights, _ = bisquare(residual, used)
     return shift, np.add.reduceat(weights, s.starts) > 0.5 * PATCH_POINTS
 

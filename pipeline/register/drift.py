@@ -11,8 +11,10 @@ from typing import NamedTuple
 import numpy as np
 
 from pipeline.model import Curve, Volume
-from pipeline.register import BAD_MISFIT_VOXELS, WALL_POINTS, Anchor, Motion, register
-from pipeline.register.shift import farthest, look
+from pipeline.register import Anchor, Motion, register
+from pipeline.register.reference import WALL_POINTS
+from pipeline.register.search import BAD_MISFIT_VOXELS
+from pipeline.register.shift import Fit, farthest, glance, look
 from reports.case_files import frames_named
 
 DRIFT = "drift_voxels"
@@ -71,12 +73,18 @@ def _moved_voxels(frame: Volume, structures: Anchor, *, doubted: bool) -> float:
 
     doubted : it is looked for far and wide, which takes a second, where it is not found near.
     """
-    near, _ = look(frame, structures.wall, Motion(), MOVED_VOXELS)
-    moved, fits = farthest(near.motion, structures.wall), near.misfit_voxels < BAD_MISFIT_VOXELS
-    if not doubted or (fits and moved < MOVED_VOXELS):
-        return moved if fits else float("nan")
+    moved = _seen_near(glance(frame, structures.wall, Motion()), structures)
+    if not moved < MOVED_VOXELS:
+        moved = _seen_near(look(frame, structures.wall, Motion())[0], structures)
+    if not doubted or moved < MOVED_VOXELS:
+        return moved
     found = register(frame, structures, MOVED_VOXELS)
     return found.moved_voxels if found.trusted else float("nan")
+
+
+def _seen_near(fit: Fit, structures: Anchor) -> float:
+    """The motion (voxels, at most) of a fit from rest; NaN where it is not to be believed."""
+    return farthest(fit.motion, structures.wall) if fit.misfit_voxels < BAD_MISFIT_VOXELS else float("nan")
 
 
 def of_drift(curves: Mapping[int, Curve], earlier: EarlierScan = FIRST) -> list[str]:

@@ -23,16 +23,16 @@ class Left(NamedTuple):
 
 def left_of(s: StaticPoints, last: Solved, *, taken: bool) -> Left:
     """What is left by the rigid fit's last step, itself ``taken`` off, or not."""
-    count = len(s.grey)
-    gain = np.repeat(last.gains, count) if len(last.gains) == 1 else spread_out(last.gains, s.starts, count)
-    return Left(gain, last.rest if taken else last.rest + last.change, _clear(s, last, gain))
+    return Left(last.gain, last.rest if taken else last.rest + last.change, _clear(s, last))
 
 
-def _clear(s: StaticPoints, last: Solved, gain: Array) -> NDArray[np.bool_]:
+def _clear(s: StaticPoints, last: Solved) -> NDArray[np.bool_]:
     """Which points (n,) are away from metal: brighter than expected, and than what a wall that moved shows."""
-    clear, doubtful = np.ones(len(gain), bool), np.flatnonzero(~last.clear)
-    top, bottom = (spread_out(of.reduceat(s.centred, s.starts), s.starts, len(gain)) for of in (np.maximum, np.minimum))
-    above = last.rest + gain * (s.centred - top - BRIGHTER * (top - bottom))
+    clear, doubtful = np.ones(len(s.grey), bool), np.flatnonzero(~last.clear)
+    top, bottom = (
+        spread_out(of.reduceat(s.centred, s.starts), s.starts, len(s.grey)) for of in (np.maximum, np.minimum)
+    )
+    above = last.rest + last.gain * (s.centred - top - BRIGHTER * (top - bottom))
     metal = np.minimum(last.rest, above) > METAL_SCALES * last.scale
     clear[doubtful] = ~near_metal(s.points_mm[doubtful], metal[doubtful], METAL_VOXELS * s.voxel_mm)
     return clear

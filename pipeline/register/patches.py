@@ -57,18 +57,18 @@ def products(rows: Array, weights: Array, starts: NDArray[np.intp]) -> Array:
     return np.stack([weighted[a:b].T @ rows[a:b] for a, b in zip(starts, ends, strict=True)])
 
 
-def shaded(squares: Array) -> tuple[Array, Array, Array]:
-    """Normal equations of least squares with each patch's offset and gain taken out, (k, m, m) and (k, m).
+def shaded(squares: Array, m: int) -> tuple[Array, Array, Array]:
+    """Normal equations of least squares with each patch's own shading taken out, (k, m, m) and (k, m).
 
-    squares : ``products`` of the unknowns' m columns, ones, what the gain multiplies, and what is to be explained. Also
-    what gives the patches' (k, 2) offsets and gains of a solution: (k, 2, m + 1), to be multiplied with (-x, 1).
+    squares : ``products`` of the m unknowns' columns, the c columns of a patch's shading, and what is to be explained.
+    Also what gives the patches' (k, c) shadings of a solution: (k, c, m + 1), to be multiplied with (-x, 1).
     """
-    m = squares.shape[1] - 3
-    others = [*range(m), m + 2]
-    own, cross = squares[:, m : m + 2, m : m + 2], squares[:, m : m + 2][:, :, others]
+    last = squares.shape[1] - 1
+    others = [*range(m), last]
+    own, cross = squares[:, m:last, m:last], squares[:, m:last][:, :, others]
     # each by its own size: as a share of both, one of a scan of large greys held the offset back
     size = np.diagonal(own, axis1=1, axis2=2)
     ridge = np.where(size > 0.0, 1e-9 * size, 1.0)
-    solved = np.asarray(np.linalg.solve(own + ridge[:, :, None] * np.eye(2), cross), np.float64)
+    solved = np.asarray(np.linalg.solve(own + ridge[:, :, None] * np.eye(last - m), cross), np.float64)
     left = squares[:, :m][:, :, others] - np.swapaxes(cross[:, :, :m], 1, 2) @ solved
     return left[:, :, :m], left[:, :, m], solved

@@ -109,7 +109,7 @@ def _best_along(frame: Volume, s: StaticPoints, motion: Motion, axis: Array) -> 
 def _rest(frame: Volume, s: StaticPoints, motion: Motion, seen: NDArray[np.bool_]) -> Array:
     """The frame's blurred grey at the moved points that are ``seen``, less the reference's in its patches' gains."""
     grey = grey_at(frame, s, motion.moved(s.points_mm))
-    rows = np.column_stack([np.ones(len(grey)), s.centred, grey])
-    _, _, shade = shaded(products(rows, seen.astype(float), s.starts))
-    rest = (grey - s.shade(shade[:, :, 0]))[seen]
+    rows = np.column_stack([s.shades, grey])
+    _, _, shade = shaded(products(rows, seen.astype(float), s.starts), 0)
+    rest = (grey - s.shade(shade[:, :, 0])[0])[seen]
     return np.asarray(rest - np.median(rest))

@@ -71,11 +71,11 @@ def wider(s: StaticPoints, left: Left, brighter: float) -> Wider:
         return Wider()
     gain, grey, clear = left
     outward = brighter * s.voxel_mm * gain * np.linalg.norm(s.gradient, axis=1)
-    rows, weights = np.column_stack([outward, np.ones(len(grey)), s.centred, grey]), clear.astype(float)
+    rows, weights = np.column_stack([outward, s.shades, grey]), clear.astype(float)
     for _ in range(ROUNDS):
-        power, right, shade = shaded(products(rows, weights, s.starts))
+        power, right, shade = shaded(products(rows, weights, s.starts), 1)
         found = float(right.sum() / (power.sum() + TINY))
-        residual = grey - outward * found - s.shade(shade @ np.array([-found, 1.0]))
+        residual = grey - outward * found - s.shade(shade @ np.array([-found, 1.0]))[0]
         weights, _ = bisquare(residual, clear)
     return Wider(found, _sd(power[:, 0, 0], right[:, 0]), s.voxel_mm)
 
