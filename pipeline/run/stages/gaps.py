@@ -2,6 +2,7 @@
 
 A wire's own gap goes with its tip, a streak makes one that stays where it is. What already lay ahead of the wire's tip
 in another frame, and stayed there while the wire came nearer, is no part of it: a line, or the marker of a catheter.
+Nor is what stays where it is while the gap before it changes, or what a deeper wire goes past.
 """
 
 from collections.abc import Sequence
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from pipeline.model import Array, Curve, arc_length
-from pipeline.run.stages.known import Frame, trusted
+from pipeline.run.stages.known import Frame
 from pipeline.status import FrameStatus
 from pipeline.trace import BEYOND_GAP, GAP
 from reports.case_files import frames_named, listed
@@ -46,7 +47,7 @@ def own_gaps(frames: Sequence[Frame], voxel_mm: float) -> tuple[list[Frame], lis
     agreed = with_tip | stays
     for n in np.flatnonzero(agreed):
         out[with_gap[n]] = out[with_gap[n]].cleared(curves[n].without(BEYOND_GAP))
-    out = [_past_marks(frame, frames, voxel_mm) for frame in _faced(out, voxel_mm)]
+    out = [_past_marks(frame, frames, voxel_mm) for frame in _left_behind(_faced(out, voxel_mm), voxel_mm)]
     odd = [f"{out[with_gap[n]].index} ({beyond[n]:.1f} mm)" for n in np.flatnonzero(~agreed) if out[with_gap[n]].ok]
     said = _pushed_along([out[with_gap[n]] for n in np.flatnonzero(with_tip & ~stays)])
     if not odd:
@@ -54,7 +55,7 @@ def own_gaps(frames: Sequence[Frame], voxel_mm: float) -> tuple[list[Frame], lis
     return out, [
         *said,
         f"{frames_named(odd)}: so much of the traced wire lies beyond a gap in it, and a second device that faces "
-        f"the wire's tip would look the same: look at the picture, or state insertion_mm{_at_one_place(out, voxel_mm)}",
+        f"the wire's tip would look the same: look at the picture, or state insertion_mm",
     ]
 
 
@@ -77,23 +78,28 @@ def _pushed_along(frames: Sequence[Frame]) -> list[str]:
     ]
 
 
-def _at_one_place(frames: Sequence[Frame], voxel_mm: float) -> str:
-    """In words, that frames end at one place while their gaps grow; empty where none do.
+def _left_behind(frames: list[Frame], voxel_mm: float) -> list[Frame]:
+    """The frames; those fail that end at one point beyond gaps that grow or shrink: what lies there does not move.
 
-    A wire that is pushed or drawn takes its end along; what stays while the rest is drawn back has broken off.
+    A wire that is pushed or drawn takes its end along; what stays has broken off, or is another device. Frames of 9, 12
+    and 15 mm of wire ended at 29 mm, where a second wire began at 17 mm, and were ok.
     """
-    unstated = {n: c for n, c in trusted(frames).items() if np.isnan(frames[n].expected_mm)}
-    for curve in unstated.values():
+    curves = [f.trusted_curve if np.isnan(f.expected_mm) else None for f in frames]
+    seen = {n: c for n, c in enumerate(curves) if c is not None}
+    out = list(frames)
+    for n, curve in seen.items():
         end = curve.points_mm[-1]
-        there = [n for n, c in unstated.items() if np.linalg.norm(c.points_mm[-1] - end) < STAYED_VOXELS * voxel_mm]
-        gaps = [unstated[n].levels[GAP] for n in there if GAP in unstated[n].levels]
-        if len(there) >= FEWEST and len(gaps) > 1 and np.ptp(gaps) > AGREE_VOXELS * voxel_mm:
-            return (
-                f"; {len(there)} frames ({listed([*map(str, there)])}) end at the same point, though the gap in them "
-                f"is {min(gaps):.1f} mm long in one and {max(gaps):.1f} mm in another: what lies there did not move "
-                "with the wire, as an end of it that has broken off, or another device"
+        there = [m for m, c in seen.items() if np.linalg.norm(c.points_mm[-1] - end) < STAYED_VOXELS * voxel_mm]
+        gaps = [seen[m].levels[GAP] for m in there if GAP in seen[m].levels]
+        if GAP in curve.levels and len(there) >= FEWEST and np.ptp(gaps) > AGREE_VOXELS * voxel_mm:
+            note = (
+                f"trace: wire: got an end at one point in {len(there)} frames "
+                f"({listed([str(frames[m].index) for m in there])}), though the gap before it is {min(gaps):.1f} mm "
+                f"long in one and {max(gaps):.1f} mm in another; expected an end that moves with the wire; what lies "
+                "there has broken off, or is another device: look at the picture, or state insertion_mm"
             )
-    return ""
+            out[n] = frames[n].failed("trace", FrameStatus.TRACE_AMBIGUOUS, note)
+    return out
 
 
 def _faced(frames: list[Frame], voxel_mm: float) -> list[Frame]:
@@ -106,7 +112,7 @@ def _faced(frames: list[Frame], voxel_mm: float) -> list[Frame]:
         for other in frames:
             if other is not frame and other.curve is not None and _lay_there(curve, other.curve, voxel_mm):
                 note = (
-                    f"trace: wire: got {curve.levels[BEYOND_GAP]:.1f} mm of line beyond a gap, which lay there in "
+                    f"trace: wire: got {curve.levels[BEYOND_GAP]:.1f} mm of line beyond a gap, which lies there in "
                     f"frame {other.index}, of {other.curve.length_mm:.1f} mm of wire; expected a line that moves with "
                     "the wire; look for a second device that faces the wire's tip; state insertion_mm"
                 )
@@ -116,9 +122,10 @@ def _faced(frames: list[Frame], voxel_mm: float) -> list[Frame]:
 
 
 def _lay_there(curve: Curve, other: Curve, voxel_mm: float) -> bool:
-    """Whether the line beyond a curve's gap lay there, off the wire, when the wire ended well before that gap."""
+    """Whether the line beyond a curve's gap lies there, off a wire that ends well before that gap, or goes past it."""
     ends_mm = curve.length_mm - curve.levels[BEYOND_GAP]
-    if not len(other.elsewhere_mm) or other.length_mm > ends_mm - curve.levels[GAP] - CAME_NEARER_MM:
+    before, past = ends_mm - curve.levels[GAP] - CAME_NEARER_MM, curve.length_mm + CAME_NEARER_MM
+    if not len(other.elsewhere_mm) or before < other.length_mm < past:
         return False
     arc = arc_length(curve.points_mm)
     off = cKDTree(other.elsewhere_mm).query(curve.points_mm[arc > ends_mm])[0]
