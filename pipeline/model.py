@@ -99,6 +99,7 @@ class Clamp:
     material_axis : (3,) where material axis 1 points at roll 0; None: the world axis least aligned with direction.
     down : (3,) where the wire's weight pulls; None: it has none.
     covariance : (6, 6) of entry_mm, mm, and of the change of the direction; None: not known.
+    fitted, left_out : numbers of the frames it was estimated from, and of those that do not fit it.
     """
 
     entry_mm: Array
@@ -108,6 +109,8 @@ class Clamp:
     note: str = ""
     warning: str = ""
     covariance: Array | None = None
+    fitted: tuple[int, ...] = ()
+    left_out: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
         """Freeze the arrays."""

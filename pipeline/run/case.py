@@ -205,7 +205,7 @@ def draw(folder: Path, pages: ledger.Pages, cores: int = 1) -> None:
 
 def _write_tables(job: Job, known: Known) -> tuple[dict[str, Any], str]:
     """Write the tables of a case; returns its row of summary.csv, and its key, for which all sources are read."""
-    errors = [outputs.error_row(frame) for frame in known.frames]
+    errors = [outputs.error_row(frame, known.clamp) for frame in known.frames]
     summary = outputs.summary_row(job.case, known, errors)
     tables.write(job.folder / ERRORS.file, ERRORS, outputs.with_strongest(errors, summary))
     points = outputs.point_columns(known.frames)

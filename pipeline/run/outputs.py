@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from pipeline.compare.metrics import rms
 from pipeline.compare.pooled import Row, Scored, is_pooled, pooled, skill_of, within
-from pipeline.model import Volume
+from pipeline.model import Clamp, Volume
 from pipeline.run.log import TIMED, Log
 from pipeline.run.projections import projections
 from pipeline.run.stages import Known
@@ -62,14 +62,16 @@ def timing_rows(case: str, log: Log, **whole: float) -> list[dict[str, Any]]:
     return [{"case": case, **{f"{stage}_s": log.seconds[stage] for stage in TIMED}, **whole}, *rows.values()]
 
 
-def error_row(frame: Frame) -> dict[str, Any]:
-    """One row of errors.csv."""
+def error_row(frame: Frame, clamp: Clamp | None = None) -> dict[str, Any]:
+    """One row of errors.csv. clamp : that of the case; None where it is not known."""
     row: dict[str, Any] = {
         "frame": frame.index,
         "status": frame.status,
         "insertion_mm": frame.depth_mm,
         "roll_deg": frame.roll_deg,
     }
+    if clamp is not None:
+        row["clamp_note"] = next((name for name in ("fitted", "left_out") if frame.index in getattr(clamp, name)), None)
     row |= {f"null_{name}_rms_mm": value for name, value in frame.nulls_rms_mm.items()}
     row |= frame.truth
     if frame.comparison is not None:

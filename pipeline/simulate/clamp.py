@@ -254,9 +254,9 @@ def estimated_clamp(
     if fit.too_coarse(at, replays[1]):
         at, last = replace(fit, replay=replays[1]).ended(at)
     found = moved(given, at[:5])
-    found = replace(found, covariance=_in_space(given, last.covariance[:5, :5]))
+    out, used = (tuple(chosen[i].index for i in which) for which in (last.out, last.used))
+    found = replace(found, covariance=_in_space(given, last.covariance[:5, :5]), fitted=used, left_out=out)
     contradiction = departed(given, found, prior.sigma_mm, prior.direction_sigma_deg)
-    out, used = ([chosen[i].index for i in which] for which in (last.out, last.used))
     left = left_out({frame.index: frame.curve for frame in chosen}, out, len(used))
     told = clamp_told(given, found, left, used, contradiction)
     rough = rougher(last.rough_mm, fit.traces, voxel_mm)

@@ -124,6 +124,7 @@ def test_one_frame_that_disagrees_is_named_and_left_out() -> None:
     assert "traces of frame 2: left out of the clamp. Traced, they lie" in found.warning
     assert "look at these traces first" in found.warning
     assert error_deg(found) < 0.8
+    assert (found.fitted, found.left_out) == ((0, 1, 3, 4), (2,))
 
 
 def test_an_exact_manifest_is_not_moved() -> None:

@@ -122,6 +122,7 @@ def test_the_output_tree_is_complete(finished: Path) -> None:
 
 def test_the_columns_are_the_contract(finished: Path) -> None:
     case = finished / "cases" / "bifurcation"
+    assert set(pd.read_csv(case / "errors.csv")["clamp_note"]) == {"fitted"}
     assert tuple(pd.read_csv(case / "errors.csv").columns) == ERRORS.names
     assert tuple(pd.read_csv(case / "points.csv.gz").columns) == POINTS.names
     assert tuple(pd.read_csv(finished / "summary.csv").columns) == SUMMARY.names

@@ -77,7 +77,7 @@ def _of_another(run: Context, other: Case, given: Clamp, own: Sequence[Frame]) -
         blind = "the clamp is blind to this case's scans, it is that of case"
         run.log.assumptions.append(f"{blind} {other.id!r}: {told}")
     run.log.warnings += [f"of case {other.id!r}: {clamp.warning}"] * bool(clamp.warning)
-    return replace(clamp, material_axis=given.material_axis, down=given.down)
+    return replace(clamp, material_axis=given.material_axis, down=given.down, fitted=(), left_out=())
 
 
 def _replayed(
