@@ -25,7 +25,7 @@ ERRORS_HEADER = (
     "null_roll_unknown_rms_mm,null_no_tip_curve_rms_mm,null_pinned_rms_mm,null_neighbours_rms_mm,skill,"
     "skill_strongest,strongest_null,coverage,trace_sigma_mm,max_penetration_mm,push_force_N,num_push_N,joints,"
     "iterations,num_mm,snaps,uncertain,least_pivot,u_input_mm,u_val_mm,share_beyond_2u,release,release_real,log_score_bits,"
-    "energy_score_mm,released,released_at_mm clamp_note,trace_mean_mm,"
+    "energy_score_mm,released,released_at_mm,clamp_note,trace_mean_mm,"
     "trace_max_mm,trace_tip_mm,truth_rms_mm,truth_tip_mm"
 )
 POINTS_HEADER = "frame,arc_mm,x_mm,y_mm,z_mm,error_mm,foot_arc_mm,contact_force_N,u_val_mm,error_over_u,status"
