@@ -80,7 +80,7 @@ class Uncertainty:
 
     lumen_mm, lumen_bias_mm : of the lumen's surface, place by place and common to
     all of it.     Relative: rest_curvature; taper (lengths over which the stiffness changes) and wall_stiffness, of
-    their logarithms.     friction : of the coefficient.
+    their logarithms.     friction : of the coefficient.     traces_mm : of own curves, across the wire.
     """
 
     __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(extra="forbid")
@@ -90,6 +90,7 @@ class Uncertainty:
     taper: LogSigma | None = None
     wall_stiffness: LogSigma | None = None
     friction: Sigma | None = None
+    traces_mm: Sigma | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -58,7 +58,7 @@ UNSTATED = {
 """Keys that name files, whose contents count, and what is no statement of the manifest."""
 OF_FILES = ("reference", "frames", "lumen", "traces")
 """Keys of which all but the files' places is a statement: how many, which dataset, item or label, the wall's level."""
-NOT_LENT = {"role", "group", "phantom", "uncertainty", "push_force_N", "push_force_sigma_N"}
+NOT_LENT = {"role", "group", "phantom", "push_force_N", "push_force_sigma_N"}
 """What a case whose clamp is borrowed states for itself alone."""
 SMALL_BYTES = 2**20
 """A file up to this is hashed where only a larger one's size is asked for."""

@@ -25,6 +25,8 @@ START = 1.0
 """Relative excess of a trace's variance at its start, over half a knot: measured 0.2 to 1.5 at contrasts of 16 to 4."""
 UNKNOWN_VOXELS = 0.15
 """Standard deviation of a trace that states none, as a user's own."""
+LEAST_VOXELS = 0.01
+"""No trace is known better here, as exact ones that are stated to be: without any error nothing could be weighed."""
 MODEL_VOXELS, MODEL_MM = 0.1, 8.0
 """How far (voxels) the simulated wire may be off at this distance (mm) from the clamp, through errors farther on, such
 as the lumen's wall."""
@@ -69,6 +71,7 @@ def _modes(trace: TraceSamples, voxel_mm: float) -> Array:
 def sigma_across(trace: TraceSamples, voxel_mm: float) -> Array:
     """Standard deviation (n,), mm, of each point across the wire, with the excess at the beginning of the trace."""
     sigma = np.where(np.isfinite(trace.sigma_mm), trace.sigma_mm, UNKNOWN_VOXELS * voxel_mm)
+    sigma = np.maximum(sigma, LEAST_VOXELS * voxel_mm)
     return np.asarray(sigma * np.sqrt(1.0 + START * np.exp(-2.0 * (trace.arc_mm / _knot(trace)) ** 2)))
 
 

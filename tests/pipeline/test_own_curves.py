@@ -94,6 +94,19 @@ def test_a_curve_that_zigzags_has_failed(tmp_path: Path) -> None:
     assert "it zigzags, as from voxel to voxel" in failures["message"].iloc[-1]
 
 
+@pytest.mark.parametrize("stated", [None, 0.0, 0.03])
+def test_how_well_own_curves_are_known_can_be_stated(tmp_path: Path, stated: float | None) -> None:
+    """The budget took them for 0.15 voxel whatever they were; 0 made the clamp's equations singular."""
+    manifest = write_study(tmp_path)
+    write_csv(tmp_path / "traces", WIRES)
+    text = manifest.read_text(encoding="utf-8") + f"[case.uncertainty]\ntraces_mm = {stated}\n" * (stated is not None)
+    manifest.write_text(text, encoding="utf-8")
+    main(["run", str(manifest), "-o", str(tmp_path / "out"), "--until", "compare", *QUICK])
+    errors = errors_of(tmp_path / "out")
+    assert set(errors["status"]) == {"ok"}
+    assert errors["trace_sigma_mm"].tolist() == pytest.approx([np.nan if stated is None else stated] * 4, nan_ok=True)
+
+
 def test_a_curve_of_few_points_is_warned_of(tmp_path: Path) -> None:
     """As 3D Slicer saves control points, which it shows as a spline: straight lines pass 0.2 mm beside it."""
     sparse = [resample(wire, 8.0) for wire in WIRES]

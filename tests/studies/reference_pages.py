@@ -74,6 +74,7 @@ KEYS = {
     "rest_curvature": "Standard deviation of the rest curvature, relative.",
     "taper": "Standard deviation of the logarithm of the lengths over which the stiffness changes.",
     "wall_stiffness": "Standard deviation of the logarithm of the wall's stiffness.",
+    "traces_mm": "Standard deviation of own curves (`traces`) across the wire, mm. Default: 0.15 voxel.",
     "friction of Uncertainty": "Standard deviation of the coefficient of friction.",
     "projections": "Two-dimensional views instead of frames.",
     "lumen_seed_mm": "Points in the lumen, LPS mm. Default: the entry.",

@@ -60,7 +60,9 @@ def as_given(run: Context, frame: Frame, curve: Curve, distance: Grid) -> Frame:
         return frame.failed("trace", FrameStatus.TRACE_FAILED, f"{curve.source}: {odd}")
     points = begun(curve.points_mm, entry, direction)
     expected = None if np.isnan(frame.expected_mm) else frame.expected_mm
-    begun_there = Curve(points, np.full(len(points), np.nan), source=curve.source)
+    stated = run.case.uncertainty.traces_mm
+    sigma_mm = np.full(len(points), np.nan if stated is None else stated)
+    begun_there = Curve(points, sigma_mm, source=curve.source)
     curve = of_length(begun_there, expected, run.config.trace)
     frame = replace(frame, voxels=frame.voxels or known_by_tip(points))
     return frame.traced_by(_in_lumen(_smooth(curve), distance, run.case.wall.stiffness_N_mm2))
