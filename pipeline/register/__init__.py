@@ -15,10 +15,11 @@ from pipeline.register.bent import Bent, bent
 from pipeline.register.branches import Branch, branch_in
 from pipeline.register.left import left_of
 from pipeline.register.padding import padding_in, unpadded
+from pipeline.register.points import static_points
 from pipeline.register.reference import WALL_POINTS, Anchor, anchor
 from pipeline.register.rigid import Motion
 from pipeline.register.search import BAD_MISFIT_VOXELS, shaded_best
-from pipeline.register.shift import MOST_METAL, Fit, Solved, farthest, fit_motion, glance, look, static_points
+from pipeline.register.shift import MOST_METAL, Fit, Solved, farthest, fit_motion, glance, look
 from pipeline.register.slide import slid
 from pipeline.register.wider import Wider, wider
 

@@ -15,7 +15,8 @@ from pipeline.arrays.grids import spelt
 from pipeline.model import Array
 from pipeline.register.left import Left
 from pipeline.register.patches import PATCH_POINTS, TINY, means, products, shaded, spread_out
-from pipeline.register.shift import StaticPoints, bisquare
+from pipeline.register.points import StaticPoints
+from pipeline.register.shift import bisquare
 
 ROUNDS = 2
 """Times that a patch's shift is found; the weights against metal are worked out anew between them."""

@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from pipeline.model import Array
 from pipeline.register.patches import spread_out
-from pipeline.register.shift import METAL_SCALES, METAL_VOXELS, Solved, StaticPoints, near_metal
+from pipeline.register.points import StaticPoints
+from pipeline.register.shift import METAL_SCALES, METAL_VOXELS, Solved, near_metal
 
 BRIGHTER = 0.1
 """Metal is brighter than the brightest of a patch by so much of its contrast: a moved wall is not."""

@@ -11,8 +11,8 @@ from pipeline.model import Array, Lumen, Volume
 from pipeline.register.branches import Shell, shell_of
 from pipeline.register.padding import Padding, off_the_rim, padding_in, unpadded
 from pipeline.register.patches import LEAST_MM, SPAN_RADII
+from pipeline.register.points import StaticPoints, static_points
 from pipeline.register.rigid import edge_mask
-from pipeline.register.shift import StaticPoints, static_points
 from pipeline.register.slide import hidden
 from solver.grid import Grid
 

@@ -1,9 +1,10 @@
 """The motion of a frame that moved: by least squares from coarse to fine, or from SimpleITK's result."""
 
 from pipeline.model import Volume
+from pipeline.register.points import StaticPoints
 from pipeline.register.reference import Anchor
 from pipeline.register.rigid import Motion, rigid
-from pipeline.register.shift import StaticPoints, farthest, fit_motion, look
+from pipeline.register.shift import farthest, fit_motion, look
 
 NEAR_VOXELS = 1.5
 """The width of a blurred wall: up to there least squares is the more exact (0.03 voxel where SimpleITK alone leaves

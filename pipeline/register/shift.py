@@ -4,33 +4,26 @@ A wall that moves by d changes grey by -gradient . d there. Values and gradients
 taken at a few thousand points alone, so that noise falls to 0.15 and nothing is interpolated.
 """
 
-from dataclasses import dataclass, replace
-from functools import cached_property
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from pipeline.arrays.grids import MAD, in_memory_order, unflattened
-from pipeline.arrays.jets import Blurred, jets_at, values_at
+from pipeline.arrays.grids import MAD, in_memory_order
+from pipeline.arrays.jets import Blurred, values_at
 from pipeline.model import Array, Volume
-from pipeline.register.patches import TINY, means, parted, products, shaded, spread_out
+from pipeline.register.patches import TINY, products, shaded
+from pipeline.register.points import StaticPoints, inside
 from pipeline.register.rigid import Motion
 
-BLUR_VOXELS = 1.0
-"""Gaussian in which grey is read: wide enough to see a wall 2 voxels away, and it takes noise to 0.15."""
-BORDER_VOXELS = 3.0
-"""Points nearer to the edge of a scan have no full Gaussian."""
 TUKEY = 4.685
 """Tukey's constant: 95 % as good as least squares where there is no metal, blind to residuals beyond 4.7 sd."""
 ABOVE_NOISE = 1.5
 """Squared steepness along a direction, over what noise alone gives, from which it shows motion: a tube cut off by the
 scan's ends has none along its axis, and fits to noise were 0.4 voxel off. Gently curved ones have 2 to 3."""
-FLAT, FLAT_POINTS = 0.25, 4000
-"""Share of a scan's voxels that lie in nothing but noise at the least, and how many are looked at."""
-OF_FLAT = 1.2125
-"""That quantile of the squared length of three normal numbers."""
 METAL_SCALES = 5.0
 """Brighter than expected by this many scales is metal."""
 METAL_VOXELS = 4.0
@@ -53,90 +46,6 @@ ROUNDS = 12
 """Gauss-Newton steps at most; a motion of half a voxel takes 3."""
 STILL_VOXELS = 0.002
 """A step smaller than this is the last."""
-
-
-@dataclass(frozen=True, eq=False)
-class StaticPoints:
-    """Points (n, 3) LPS mm on structures that do not move against each other, with the reference's blurred grey (n,)
-    and its gradient (n, 3) per mm; blur_mm : of both; voxel_mm : the unit in which motion is judged; noise : standard
-    deviation of each of the gradient's components by noise alone; starts : first point of each patch (see ``patches``);
-    sloped : whether offset and gain of grey are linear in the place (``ramps``).
-    """
-
-    points_mm: Array
-    grey: Array
-    gradient: Array
-    blur_mm: float
-    voxel_mm: float
-    noise: float
-    starts: NDArray[np.intp]
-    sloped: bool = False
-
-    @cached_property
-    def centred(self) -> Array:
-        """Grey (n,) less that of each point's patch at the mean."""
-        return np.asarray(self.grey - spread_out(means(self.grey, self.starts), self.starts, len(self.grey)))
-
-    @cached_property
-    def ramps(self) -> Array:
-        """What a patch's offset and gain of grey are made of, (n, 1 or 4): a number, and slopes along the axes."""
-        one = np.ones((len(self.grey), 1))
-        away = (self.points_mm - self.centre_mm) / self.lever_mm
-        return np.column_stack([one, away]) if self.sloped else one
-
-    @cached_property
-    def shades(self) -> Array:
-        """The columns (n, 2 or 8) of a patch's offset and gain."""
-        return np.column_stack([self.ramps, self.ramps * self.centred[:, None]])
-
-    def shade(self, of_patches: Array) -> tuple[Array, Array]:
-        """The grey (n,) of the patches' offsets and gains (k, 2 or 8), and the gain (n,)."""
-        each = spread_out(of_patches, self.starts, len(self.grey))
-        gains = each[:, self.ramps.shape[1] :]
-        return np.sum(self.shades * each, axis=1), np.sum(self.ramps * gains, axis=1)
-
-    @cached_property
-    def in_one(self) -> "StaticPoints":
-        """The same points in one patch: one gain for all of the scan, with which far motions are found best."""
-        return replace(self, starts=np.zeros(1, np.intp))
-
-    @cached_property
-    def sloping(self) -> "StaticPoints":
-        """The same in one patch whose grey may slope, for what is left of a motion.
-
-        A field that rises by the vessel's contrast over 18 mm, flat in the reference, moved the wall by 0.4 voxel. From
-        far, slopes explain a motion's grey as well: of motions of 3 to 5 voxels, 11 in 18 were not found.
-        """
-        return replace(self.in_one, sloped=True)
-
-    @cached_property
-    def centre_mm(self) -> Array:
-        """Centroid (3,)."""
-        return np.asarray(self.points_mm.mean(axis=0))
-
-    @cached_property
-    def radius_mm(self) -> float:
-        """Root mean square distance from the centroid: what turns an angle into a displacement."""
-        return float(np.sqrt(np.mean(np.sum((self.points_mm - self.centre_mm) ** 2, axis=1))))
-
-    @property
-    def lever_mm(self) -> float:
-        """The radius, by which turns are made shifts; that of one point is a voxel."""
-        return max(self.radius_mm, self.voxel_mm)
-
-    @cached_property
-    def steepness(self) -> float:
-        """Root mean square gradient, per mm."""
-        return float(np.sqrt(np.mean(np.sum(self.gradient**2, axis=1))))
-
-    def noise_voxels(self, of_frame: float) -> float:
-        """The misfit of a frame by noise alone. of_frame : the frame's own, as ``noise``.
-
-        White noise leaves sqrt(2) times as much in blurred grey as in its gradient times the blur. Correlated over 0.7
-        voxel it was within 15 %.
-        """
-        both = float(np.hypot(self.noise, of_frame))
-        return float(np.sqrt(2.0)) * both * self.blur_mm / max(self.voxel_mm * self.steepness, TINY)
 
 
 class Solved(NamedTuple):
@@ -162,30 +71,6 @@ class Fit:
     motion: Motion
     misfit_voxels: float
     last: Solved | None = None
-
-
-def inside(scan: Volume, points_mm: Array) -> NDArray[np.bool_]:
-    """Which points (n, 3) lie well inside a scan."""
-    index = scan.to_index(points_mm)
-    return np.asarray(np.all((index > BORDER_VOXELS) & (index < np.array(scan.shape) - 1 - BORDER_VOXELS), axis=1))
-
-
-def static_points(
-    reference: Volume, points_mm: Array, patch_mm: float, blur_voxels: float = BLUR_VOXELS
-) -> StaticPoints:
-    """Read the reference at the points (n, 3) that lie well inside it; patch_mm : extent of two patches."""
-    points = points_mm[inside(reference, points_mm)]
-    order, starts = parted(points, patch_mm)
-    points = np.ascontiguousarray(points[order])
-    grid, _ = in_memory_order(reference)
-    voxel = grid.voxel_mm
-    field = Blurred(grid.values, grid.spacing_mm, blur_voxels * voxel)
-    jets = jets_at(field, grid.to_index(points) * grid.spacing_mm)
-    anywhere = unflattened(np.arange(0, grid.values.size, 1 + grid.values.size // FLAT_POINTS), grid.shape)
-    steep = np.sum(jets_at(field, anywhere * grid.spacing_mm)[:, 1:4] ** 2, axis=1)
-    steep = steep[steep > 1e-12 * float(steep.max(initial=0.0))]  # not the padding around what was reconstructed
-    noise = float(np.sqrt(np.quantile(steep, FLAT) / OF_FLAT)) if len(steep) else 0.0
-    return StaticPoints(points, jets[:, 0], jets[:, 1:4] @ grid.direction.T, blur_voxels * voxel, voxel, noise, starts)
 
 
 def _seen(normal: Array, right: Array, least: float) -> Array:
@@ -262,7 +147,7 @@ def _step(s: StaticPoints, at_mm: Array, grey: Array, motion: Motion) -> Fit:
 
 def glance(frame: Volume, s: StaticPoints, motion: Motion) -> Fit:
     """One step from ``motion`` on, with one gain of grey."""
-    return fit_motion(frame, s.in_one, motion, rounds=1)
+    return _steps(frame, s, motion, [s.in_one])[0]
 
 
 def look(frame: Volume, s: StaticPoints, motion: Motion) -> tuple[Fit, bool]:
@@ -270,9 +155,18 @@ def look(frame: Volume, s: StaticPoints, motion: Motion) -> tuple[Fit, bool]:
 
     Slopes are the less disturbed by noise: patches have their own gains where they do not explain the frame.
     """
-    one, own = (fit_motion(frame, points, motion, rounds=1) for points in (s.sloping, s))
+    one, own = _steps(frame, s, motion, [s.sloping, s])
     varied = own.misfit_voxels < VARIED * one.misfit_voxels
     return (own if varied else one), varied
+
+
+def _steps(frame: Volume, s: StaticPoints, motion: Motion, shadings: Sequence[StaticPoints]) -> list[Fit]:
+    """One step from ``motion`` on with each of the ``shadings`` of the same points."""
+    at = motion.moved(s.points_mm)
+    if np.mean(inside(frame, at)) < MOST_SEEN:
+        return [Fit(motion, float("inf")) for _ in shadings]
+    grey = grey_at(frame, s, at)
+    return [_step(points, at, grey, motion) for points in shadings]
 
 
 def farthest(motion: Motion, s: StaticPoints) -> float:
@@ -287,11 +181,9 @@ def fit_motion(frame: Volume, s: StaticPoints, start: Motion | None = None, roun
     """
     fit = Fit(start or Motion(), float("inf"))
     for _ in range(rounds):
-        at = fit.motion.moved(s.points_mm)
-        if np.mean(inside(frame, at)) < MOST_SEEN:
-            return Fit(fit.motion, float("inf"))
-        fit = _step(s, at, grey_at(frame, s, at), fit.motion)
-        assert fit.last is not None
+        fit = _steps(frame, s, fit.motion, [s])[0]
+        if fit.last is None:
+            break
         if np.linalg.norm(fit.last.amounts[:3]) + np.linalg.norm(fit.last.amounts[3:]) < STILL_VOXELS:
             break
     return fit

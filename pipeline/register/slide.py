@@ -11,17 +11,16 @@ from numpy.typing import NDArray
 from pipeline.arrays.grids import spread
 from pipeline.model import Array, Volume
 from pipeline.register.patches import TINY, products, shaded
+from pipeline.register.points import StaticPoints, inside
 from pipeline.register.rigid import Motion
 from pipeline.register.shift import (
     ABOVE_NOISE,
     METAL_SCALES,
     METAL_VOXELS,
-    StaticPoints,
     changes,
     farthest,
     fit_motion,
     grey_at,
-    inside,
     moved_by,
     near_metal,
 )

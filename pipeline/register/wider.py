@@ -12,7 +12,8 @@ from pipeline.arrays.grids import spread
 from pipeline.model import Array
 from pipeline.register.left import Left
 from pipeline.register.patches import TINY, products, shaded
-from pipeline.register.shift import StaticPoints, bisquare
+from pipeline.register.points import StaticPoints
+from pipeline.register.shift import bisquare
 
 ROUNDS = 3
 """Times that it is found; the weights are worked out anew between them."""

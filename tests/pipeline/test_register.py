@@ -15,8 +15,9 @@ from data_synthetic.scanner import PsfScanner
 from pipeline.model import Lumen, Volume
 from pipeline.register import Anchor, Motion, Registration, anchor, register
 from pipeline.register.frames import alignment_of, record, sentences_of
+from pipeline.register.points import static_points
 from pipeline.register.rigid import rigid
-from pipeline.register.shift import fit_motion, look, static_points
+from pipeline.register.shift import fit_motion, look
 from pipeline.register.slide import slid
 from pipeline.segment import segment
 from solver import Grid
