@@ -85,9 +85,9 @@ def trace_frames(run: Context, known: Known) -> Known:
     run.log.warnings += _in_plane(frames, run.config.trace)
     assumed, doubtful = sentences_of(work.alignment, {frame.index: frame.registration for frame in frames})
     run.log.assumptions += assumed
-    run.log.warnings += doubtful + of_drift(
-        {f.index: f.curve for f in frames if f.curve is not None}, work.earlier_scan
-    )
+    # a wall that is not the vessel's fits no motion of the phantom: "it is soft and bends" sent users to scan it anew
+    run.log.warnings += [] if known.lumen_doubt else doubtful
+    run.log.warnings += of_drift({f.index: f.curve for f in frames if f.curve is not None}, work.earlier_scan)
     frames = [_first_said(frame, known.lumen_doubt) for frame in frames]
     return _with_room(run, replace(known, off_the_scans=bool(off_scans)), frames, elsewhere)
 
