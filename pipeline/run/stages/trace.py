@@ -9,7 +9,7 @@ import numpy as np
 
 from pipeline.arrays.fingerprint import known_by
 from pipeline.arrays.grids import corners_mm
-from pipeline.load import Crop, Header
+from pipeline.load import Crop, Header, of_several_greys
 from pipeline.model import Curve, Lumen, Volume
 from pipeline.register import Anchor, Motion, anchor
 from pipeline.register.drift import FIRST, REFERENCE, EarlierScan, of_drift, with_drift
@@ -208,7 +208,7 @@ class _Tracing:
     def look(self, run: Context, frame: Frame, header: Header, earlier: Earlier[_Part]) -> _Part:
         """Read, align and trace one frame; LoadError where it cannot be read."""
         log = run.log
-        volume = run.load(Crop(header, self.box, self.load), frame.index)
+        volume = of_several_greys(run.load(Crop(header, self.box, self.load), frame.index), header.source)
 
         def read_moved(motion: Motion) -> Volume:
             box = header.box_of(motion.moved(self.corners))
