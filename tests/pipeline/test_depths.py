@@ -13,7 +13,6 @@ from pipeline.model import Curve, Lumen
 from pipeline.run.log import Log
 from pipeline.run.stages.depths import (
     drawn_back,
-    in_another_order,
     in_step,
     on_another_scale,
     perhaps_turned,
@@ -27,6 +26,7 @@ from pipeline.run.stages.depths import (
 from pipeline.run.stages.dim_ends import barely_seen, faint_ends, own_dim_ends
 from pipeline.run.stages.gaps import own_gaps
 from pipeline.run.stages.known import Frame
+from pipeline.run.stages.misstated import as_steps, in_another_order
 from pipeline.run.stages.repeated import kept, once
 from pipeline.run.stages.thickness import not_too_thick
 from pipeline.run.stages.trace import _in_step, _last_curve, _Part
@@ -226,6 +226,22 @@ def test_frames_in_another_order_are_named_as_such() -> None:
         assert not in_another_order(other, from_entry(other), 2.0)
     unknown = frames(DEPTHS[:2], [float("nan")] * 2)
     assert not in_another_order(unknown, from_entry(unknown), 2.0)
+
+
+def test_depths_given_as_increments_are_asked_about() -> None:
+    """ "The wire is replayed as drawn back there" was all that was said of four frames that failed by their lengths."""
+    steps = list(np.diff(DEPTHS, prepend=0.0))
+    seen = frames(DEPTHS, steps)
+    (said,) = as_steps(seen, from_entry(seen), 2.0)
+    assert said.endswith(
+        "(frame 5: 30.0 mm, stated 4, sum 30.0): are these increments? State the depth of each frame, counted from "
+        "entry_mm"
+    )
+    assert Caveats(warnings=[said]).against
+    assert not as_steps(seen[:2], from_entry(seen[:2]), 2.0)
+    for lengths, stated in ((DEPTHS, DEPTHS), (DEPTHS[::-1], DEPTHS), (steps, steps), (DEPTHS, [np.nan] * 6)):
+        other = frames(lengths, stated)
+        assert not as_steps(other, from_entry(other), 2.0)
 
 
 def test_too_few_frames_or_no_depths_say_nothing() -> None:

@@ -186,25 +186,6 @@ def _scale_from_zero(stated: Array, apart: Array) -> tuple[float, float]:
     return slope, float(np.linalg.norm(apart - slope * stated)) / float(np.sqrt(len(stated) - 1))
 
 
-def in_another_order(frames: Sequence[Frame], depths_mm: Mapping[int, float], tolerance_mm: float) -> list[str]:
-    """A warning where the wires have the stated depths, but those of other frames. depths_mm : of ``traced_depths``."""
-    numbers = [*depths_mm]
-    stated = np.array([f.expected_mm for f in frames if f.index in depths_mm])
-    traced = np.array([depths_mm[n] for n in numbers])
-    place = np.argsort(np.argsort(traced, kind="stable"), kind="stable")
-    whose = np.argsort(stated, kind="stable")[place]
-    apart = np.abs(traced - stated)
-    if not np.any(apart > tolerance_mm) or np.any(np.abs(traced - stated[whose]) > tolerance_mm):
-        return []
-    worst = int(np.argmax(apart))
-    count = np.count_nonzero(apart > tolerance_mm)
-    return [
-        f"the traced wires have the depths that insertion_mm states, of other frames ({count} of {len(numbers)}): that "
-        f"of frame {numbers[worst]}, {traced[worst]:.1f} mm, is of frame {numbers[int(whose[worst])]}; are frames and "
-        "insertion_mm in one order?"
-    ]
-
-
 def perhaps_turned(frames: Sequence[Frame]) -> list[Frame]:
     """The frames; one that is refused for its length, and whose trace has hardly begun, may run the wrong way."""
     out = list(frames)

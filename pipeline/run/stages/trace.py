@@ -22,7 +22,6 @@ from pipeline.run.stages.beside import beside_what_is_seen
 from pipeline.run.stages.brightness import of_another_brightness
 from pipeline.run.stages.depths import (
     drawn_back,
-    in_another_order,
     in_step,
     on_another_scale,
     perhaps_turned,
@@ -37,6 +36,7 @@ from pipeline.run.stages.dim_ends import barely_seen, faint_ends, own_dim_ends
 from pipeline.run.stages.gaps import own_gaps
 from pipeline.run.stages.given import entry_sigma_mm
 from pipeline.run.stages.known import Context, Frame, Known, trusted
+from pipeline.run.stages.misstated import as_steps, in_another_order
 from pipeline.run.stages.own_curves import RESAMPLE, as_given, given_curves, rough
 from pipeline.run.stages.repeated import alike, once, rescanned
 from pipeline.run.stages.thickness import not_too_thick, too_thin
@@ -96,7 +96,8 @@ def _in_step(run: Context, frames: list[Frame], voxel_mm: float) -> list[Frame]:
     """The frames, those out of step not to be trusted; warnings of what lengths and own curves tell of themselves."""
     tolerance_mm = run.config.trace.length_tolerance_mm
     depths_mm = traced_depths(frames, run.case.entry_mm, run.case.entry_direction)
-    swapped = in_another_order(frames, depths_mm, tolerance_mm)
+    given = frames, depths_mm, tolerance_mm
+    swapped = in_another_order(*given) or as_steps(*given)
     run.log.warnings += swapped
     frames = frames if swapped else perhaps_turned(frames)
     common_mm = float(np.hypot(entry_sigma_mm(run.case, voxel_mm), TIP_VOXELS * voxel_mm))
