@@ -59,7 +59,8 @@ def trace_frames(run: Context, known: Known) -> Known:
     if not known.scans.frames:
         if not given:
             return known
-        own = [as_given(run, *pair, known.vessel.distance) for pair in zip(known.frames, given, strict=True)]
+        scan = None if known.scans.first is None else known.scans.first.grid
+        own = [as_given(run, *pair, known.vessel.distance, scan) for pair in zip(known.frames, given, strict=True)]
         run.log.warnings += rescanned(own, run.case.calibrated_traces)
         single = once(own, run.case.calibrated_scans, run.case.calibrated_traces)
         return _with_room(run, known, _in_step(run, single, voxel_mm))
@@ -225,7 +226,7 @@ class _Tracing:
                 seen = with_drift(seen, volume, self.structures, self.earlier_scan)
         done = _of_scan(run, frame, seen, self.lumen)
         if self.given:
-            done = as_given(run, frame, self.given[frame.index], self.lumen.distance)
+            done = as_given(run, frame, self.given[frame.index], self.lumen.distance, header.grid)
         before = (earlier(k) for k in range(frame.index))
         window = next((part.window for part in before if part.window), None)
         if window is None and done.trusted_curve is not None:
