@@ -196,6 +196,12 @@ def test_broken_toml_and_no_file(tmp_path: Path) -> None:
 SECOND = GOOD.split("[[case]]")[1].replace("run1", "run2")
 
 
+def test_a_table_of_a_case_at_the_top_is_told_where_it_belongs(tmp_path: Path) -> None:
+    said = problems(tmp_path, f"{GOOD}[wall]\nstiffness_N_mm2 = 2.0\n")
+    assert "wall: unknown key; it belongs to a case: write it below its [[case]], a table as [case.wall]" in said
+    assert "walls: unknown key; allowed: case, schema, wires" in problems(tmp_path, f"{GOOD}[walls]\n")
+
+
 def test_a_clamp_is_borrowed_from_another_case(tmp_path: Path) -> None:
     first, second = read_manifest(written(tmp_path, f'{GOOD}\n[[case]]{SECOND}\nentry = "case:run1"\n')).cases
     assert second.entry_case is not None
