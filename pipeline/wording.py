@@ -142,10 +142,17 @@ def _node(schema: Schema, place: Place) -> tuple[Schema, bool]:
 
 
 def _no_such_key(schema: Schema, place: Place) -> str:
-    node, _ = _node(schema, place[:-1])
+    key = str(place[-1])
+    if len(place) == 1 and "case" in schema.get("properties", {}) and key in _keys(schema, ("case", 0)):
+        return f": unknown key; it belongs to a case: write it below its [[case]], a table as [case.{key}]"
+    return f": unknown key; {did_you_mean(key, _keys(schema, place[:-1]))}"
+
+
+def _keys(schema: Schema, place: Place) -> list[str]:
+    """The keys that a user may write in the table at a place."""
+    node, _ = _node(schema, place)
     options = _branches(node, schema.get("$defs", {}))
-    names = [name for one in options for name, of in one.get("properties", {}).items() if of.get("not") != {}]
-    return f": unknown key; {did_you_mean(str(place[-1]), names)}"
+    return [name for one in options for name, of in one.get("properties", {}).items() if of.get("not") != {}]
 
 
 def _numbers(found: Any) -> Iterator[float]:

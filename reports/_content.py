@@ -43,6 +43,16 @@ def length(value: Any) -> str:
     return "0" if isinstance(value, float) and abs(value) < 1e-6 else number(value)
 
 
+SKILLS = "skill", "skill_strongest"
+LEAST_TOLD = -10.0
+"""Skill below which no number is given: 3.3 times the rival's error."""
+
+
+def skill_told(skill: float, text: str = "") -> str:
+    """A skill in words: how far below LEAST_TOLD it is says no more, since a rival's error may be next to nothing."""
+    return f"below {LEAST_TOLD:g}" if skill < LEAST_TOLD else text or number(skill)
+
+
 def _shown(value: Any, column: Column) -> str:
     """A value of a column in words."""
     return length(value) if column.unit == "mm" else number(value)
@@ -116,6 +126,7 @@ def cards(entries: Iterable[Mapping[str, str]], statistics: Mapping[str, Any]) -
         value = _shown(statistics.get(name), SUMMARY[name]) if name in SUMMARY.names else NOTHING
         if value != NOTHING:
             column = SUMMARY[name]
+            value = skill_told(float(statistics[name])) if name in SKILLS else value  # as the sentences above have it
             total = f"of {statistics[entry['of']]} " if entry.get("of") in statistics else ""
             ends = _interval(statistics, column)
             interval_95 = f" (95 %: {ends})" if ends else _withheld(statistics, name) if name in _WITH_INTERVAL else ""

@@ -121,6 +121,9 @@ class Difference:
             failed = int((~self.new["after"].isin([*GOOD, "present"])).sum())
             tail += f"; held against nothing, since only the second run has them: {counted(len(self.new), 'frame')}"
             tail += f", {failed} of which failed" * bool(failed)
+        come = self.rows[(self.rows["verdict"] == "new") & (self.rows["column"] == "simulator")]
+        if len(come):
+            tail += f"; only the second run has the simulator {listed([*come['simulator']])}"
         if not n_bad:
             return f"{head}: no regression{tail}"
         alone = "; no error of a simulated wire is worse than is allowed" * self.beside_errors

@@ -6,6 +6,7 @@ Each case says it of itself: a folder may hold cases that were run at different 
 from collections.abc import Iterable, Mapping
 from hashlib import sha256
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from reports.case_files import counted, listed, manifests_in, results_in, runs_in
@@ -27,7 +28,7 @@ def what_differs(before: Path, after: Path) -> list[dict[str, str]]:
     both = old.keys() & new.keys()
     first, second = _whole(before, old) | _cases(old), _whole(after, new) | _cases(new)
     before_said, after_said = _stated(old, both), _stated(new, both)
-    of_cases = [(_inputs(old, both), _inputs(new, both), "input"),
+    of_cases = [(_inputs(old, both), _inputs(new, both, old), "input"),
                 (_known_to(before_said, after_said), _known_to(after_said, before_said), "manifest")]  # fmt: skip
     silent = [told.keys() <= {"cases"} for told in (first, second)]
     if any(silent):  # golden tables say nothing of where they come from
@@ -35,6 +36,9 @@ def what_differs(before: Path, after: Path) -> list[dict[str, str]]:
         what = "settings, code and inputs: not compared"
         first, second = ({"cases": told["cases"], what: UNTOLD if mute else TOLD}
                          for told, mute in zip((first, second), silent, strict=True))  # fmt: skip
+    if second.get("manifest") != first.get("manifest") and _stated_alike(old, new, both):
+        first, second = ({_TEXT if name == "manifest" else name: value for name, value in told.items()}
+                         for told in (first, second))  # fmt: skip
     rows = [(name, first.get(name, ABSENT), second.get(name, ABSENT)) for name in dict.fromkeys([*first, *second])]
     for files, others, what in of_cases:
         same: dict[tuple[str, str, str], list[str]] = {}
@@ -181,20 +185,26 @@ def _cases(found: Iterable[str]) -> Told:
     return {"cases": ", ".join(sorted(found))}
 
 
-STATED, AT_CHOICE = ("wire", "wall", "entry"), ("role", "group", "down", "catheter")
-"""Parts of result.json that say what the manifest states of a case, with calibrated parameters where there are any; and
-those that are left out where it states none."""
+OF_CASE = "[[case]]"
+STATED, AT_CHOICE = {"wire": "[wires]", "wall": "[case.wall]", "entry": OF_CASE}, ("role", "group", "down", "catheter")
+"""Parts of result.json that say what the manifest states of a case, with calibrated parameters where there are any, by
+its table for them; and keys that are left out where it states none."""
+_TEXT = "manifest (its text alone: it states the same of every case)"
 FOUND = "used_", "sigma_", "covariance"
 """How keys begin in them of what was found."""
 
 
 def _stated(found: Mapping[str, Mapping[str, Any]], cases: Iterable[str]) -> dict[tuple[str, str], str]:
-    """What the manifest states, by case and table.key. Results of an earlier version do not say all of it."""
+    """What the manifest states, by case and key. Results of an earlier version do not say all of it."""
     said: dict[tuple[str, str], str] = {}
     for case in sorted(cases):
-        values = {f"{table}.{key}": v for table in STATED for key, v in found[case].get(table, {}).items()}
-        values = {name: v for name, v in values.items() if not name.partition(".")[2].startswith(FOUND)}
-        values |= {name: found[case].get(name) for name in AT_CHOICE}
+        values = {
+            f"{table} {key}": value
+            for part, table in STATED.items()
+            for key, value in found[case].get(part, {}).items()
+            if not key.startswith(FOUND)
+        }
+        values |= {f"{OF_CASE} {name}": found[case].get(name) for name in AT_CHOICE}
         said |= {(case, name): ABSENT if value is None else str(value) for name, value in values.items()}
     return said
 
@@ -203,21 +213,39 @@ def _known_to(said: Mapping[tuple[str, str], str], other: Mapping[tuple[str, str
     return {key: value for key, value in said.items() if key in other}
 
 
-def _inputs(found: Mapping[str, Mapping[str, Any]], cases: Iterable[str]) -> dict[tuple[str, str], str]:
+def _stated_alike(
+    old: Mapping[str, Mapping[str, Any]], new: Mapping[str, Mapping[str, Any]], cases: Iterable[str]
+) -> bool:
+    """Whether two manifests are known to state the same of all cases: a comment gave two hashes, and no word on it."""
+    said = [(old[case].get("stated"), new[case].get("stated")) for case in cases]
+    return bool(said) and len(old) == len(new) == len(said) and all(a is not None and a == b for a, b in said)
+
+
+def _inputs(
+    found: Mapping[str, Mapping[str, Any]],
+    cases: Iterable[str],
+    before: Mapping[str, Mapping[str, Any]] = MappingProxyType({}),
+) -> dict[tuple[str, str], str]:
     """Hashes by case and key of the manifest; rows of an older version, which have no key, by their paths.
 
-    Another simulator's wires, of which all files differ where the simulator does, have one hash together.
+    Another simulator's wires, of which all files differ where the simulator does, have one hash together. Where some of
+    them alone differ from those ``before``, these are named.
     """
     hashes: dict[tuple[str, str], str] = {}
     for case in sorted(cases):
-        wires = []
-        for item in found[case].get("inputs", ()):
-            key, value = str(item.get("key", item["path"])), str(item["sha256"])[:12]
-            if key.startswith(WIRES):
-                wires.append(value)
-            else:
-                hashes[case, key] = value
+        files = _files(found[case])
+        wires = [value for key, (_, value) in files.items() if key.startswith(WIRES)]
+        hashes |= {(case, key): value for key, (_, value) in files.items() if not key.startswith(WIRES)}
         if wires:
             together = sha256("".join(wires).encode()).hexdigest()[:12]
-            hashes[case, WIRES] = f"{counted(len(wires), 'file')}, {together}"
+            known = {value for _, value in _files(before.get(case, {})).values()}
+            other = [name for key, (name, value) in files.items() if key.startswith(WIRES) and value not in known]
+            some = f"; other: {listed(other)}" if 0 < len(other) < len(wires) else ""
+            hashes[case, WIRES] = f"{counted(len(wires), 'file')}, {together}{some}"
     return hashes
+
+
+def _files(result: Mapping[str, Any]) -> dict[str, tuple[str, str]]:
+    """A case's input files by key: name and hash, its first digits."""
+    rows = result.get("inputs", ())
+    return {str(row.get("key", row["path"])): (Path(row["path"]).name, str(row["sha256"])[:12]) for row in rows}

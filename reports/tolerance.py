@@ -75,7 +75,8 @@ def _check_errors(given: Iterable[str], path: Path) -> None:
     """
     errors = [column.name for column in ERRORS if column.unit == "mm" and column.better == "low"]
     if not set(given) & set(errors):
+        found = ", ".join(given) or f"[{SHARE}] alone"
         raise ValueError(
-            f"{path}: found {', '.join(given)}: no error, so that errors of any size would pass; name at least rms_mm, "
-            f"as in rms_mm = 0.03; one is needed of {', '.join(errors)}"
+            f"{path}: found {found}: no error, so that errors of any size would pass; name at least rms_mm, as in "
+            f"rms_mm = 0.03; one is needed of {', '.join(errors)}"
         )

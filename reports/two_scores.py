@@ -8,6 +8,7 @@ from typing import Any
 import pandas as pd
 
 from reports.diff import Difference
+from reports.origin import ABSENT
 from reports.schema import ALL
 from reports.two_runs import Judged, Verdict
 
@@ -32,7 +33,7 @@ def together(runs: tuple[Path, Path], parts: Mapping[str, Verdict], gone: list[s
     told = list(dict.fromkeys(part.alike for part in parts.values()))
     return Verdict(
         runs,
-        _differs(parts),
+        [*_others(gone, come), *_differs(parts)],
         [{"simulator": name, **row} for name, part in parts.items() for row in part.pooled],
         "; ".join(f"{name}: {part.paired}" for name, part in parts.items() if part.paired),
         judged,
@@ -42,6 +43,12 @@ def together(runs: tuple[Path, Path], parts: Mapping[str, Verdict], gone: list[s
         [{"simulator": name, **row} for name, part in parts.items() for row in part.warned],
         "; ".join(f"{name}: {part.void}" for name, part in parts.items() if part.void),
     )
+
+
+def _others(gone: list[str], come: list[str]) -> list[dict[str, str]]:
+    """Simulators that one run alone has, as what differs between the two."""
+    held = [(name, "present", ABSENT) for name in gone] + [(name, ABSENT, "present") for name in come]
+    return [{"what": f"simulator {name}", "before": before, "after": after} for name, before, after in held]
 
 
 def _caveats(said: Mapping[str, str], *, several: bool) -> str:

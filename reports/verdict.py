@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 from math import inf, isnan, nan
 from typing import Any
 
-from reports._content import NOTHING, fewer_frames, interval, length, number, predictor_label, value_of
+from reports._content import NOTHING, fewer_frames, interval, length, number, predictor_label, skill_told, value_of
 from reports.case_files import counted
 from reports.doubts import NO_CAVEATS, Caveats
 from reports.few_insertions import alone_in, of_these_alone, over_few, wide_over_few
@@ -43,7 +43,7 @@ def _sentences(
 ) -> Iterator[tuple[str, bool]]:
     """The verdict's sentences, each with whether it belongs into the headline."""
     if caveats.copied:
-        yield f"{caveats.copied}.", True
+        yield _ended(caveats.copied), True
         return
     rms, true = (length(statistics.get(key)) for key in ("rms_mm", "truth_rms_mm"))
     if rms == NOTHING:
@@ -55,7 +55,7 @@ def _sentences(
         (f"From the true wire it lies {true} mm." * (true != NOTHING), True),
         (_at_the_floor(statistics), False),
         (_beyond_inputs(statistics), True),
-        (_warned(caveats), True),
+        (_warned(caveats, beside=bool(remarks(statistics, simulator, caveats))), True),
         (tips_off(statistics), True),
         (against, True),
         (weaker, True),
@@ -79,15 +79,23 @@ def _far(statistics: Mapping[str, Any], simulator: str, rms: str) -> str:
     return sentence + (f"; 95 % of its points lie within {tail} mm." if tail != NOTHING else ".")
 
 
-def _warned(caveats: Caveats) -> str:
+def _ended(text: str) -> str:
+    """A sentence with its full stop; a warning may end with a question."""
+    return text if text.endswith(("?", ".")) else f"{text}."
+
+
+def _warned(caveats: Caveats, *, beside: bool) -> str:
     """How many warnings stand below, and what the weightiest finds that speaks against an input: with a roll 25 degrees
     off a wire was better than a guess, which was all that the first screen said.
+
+    beside : whether the verdict itself holds what a terminal shows as one more warning.
     """
     if not caveats.against:
-        return f"{counted(len(caveats.warnings), 'warning')} below." * bool(caveats.warnings)
+        what = "more warning" if beside else "warning"
+        return f"{counted(len(caveats.warnings), what)} below." * bool(caveats.warnings)
     others = f"The weightiest of {len(caveats.warnings)} warnings" if len(caveats.warnings) > 1 else "A warning"
     found = _LISTS.sub("", caveats.against.partition(": check ")[0])
-    return f"{others}: {found}."
+    return f"{others}: {_ended(found)}"
 
 
 FLOOR_SIGMAS = 1.4142
@@ -129,8 +137,6 @@ NEVER_NEAREST = TIPS_OFF, COPIED
 """Why a simulator leads nowhere, whatever its distances to the traced wire."""
 
 
-LEAST_TOLD = -10.0
-"""Skill below which a sentence gives no number: 3.3 times the rival's error."""
 FAR_BELOW = 0.7
 WORSE_BELOW = -0.1
 """Skill without an interval below which a wire is worse than its rival: an rms 5 % above that one's."""
@@ -220,7 +226,7 @@ def in_short(statistics: Mapping[str, Any]) -> str:
         return ""
     name = statistics.get("strongest_null") if number(statistics.get("skill_strongest")) != NOTHING else "centreline"
     rival = f"the predictor {predictor_label(str(name))!r}"
-    value = " ".join(filter(None, (f"skill {_at_least(skill, f'{skill:.3f}')}", fewer_frames(statistics))))
+    value = " ".join(filter(None, (f"skill {skill_told(skill, f'{skill:.3f}')}", fewer_frames(statistics))))
     said = {
         TIPS_OFF: f"the tips lie off, judge by tip_median_mm ({value} against {rival})",
         WORSE: f"the simulated wire is worse than {rival} ({value})",
@@ -238,7 +244,7 @@ def _against(statistics: Mapping[str, Any], *, defined: bool) -> tuple[str, str,
         return "", "", ""
     if not defined and number(statistics.get("skill_strongest")) != NOTHING:
         rival = f"the predictor {predictor_label(str(statistics.get('strongest_null')))!r}"
-    value = " ".join(filter(None, (f"skill {_at_least(skill, number(skill))}", fewer_frames(statistics))))
+    value = " ".join(filter(None, (f"skill {skill_told(skill)}", fewer_frames(statistics))))
     unsure = f"{value}, {_interval_of(least)}" if least <= 0.0 else value
     would = "it is not shown to be better" if least <= 0.0 else "it would be better"
     said = {
@@ -249,15 +255,20 @@ def _against(statistics: Mapping[str, Any], *, defined: bool) -> tuple[str, str,
     }
     how = said.get(standing(statistics), f"The wire is better ({value})")
     few = wide_over_few(statistics) if least <= 0.0 < skill else ""
-    how, weaker = (f"On these frames {how[0].lower()}{how[1:]}", _WEAKER) if _of_frames(statistics) else (how, "")
-    return f"{how} than {rival}.", few, weaker
+    if not _of_frames(statistics):
+        return f"{how} than {rival}.", few, ""
+    return f"On these frames {how[0].lower()}{how[1:]} than {rival}.", few, _weaker(statistics)
 
 
-# a lost half of an insertion took the partner of "another insertion": 0.926 instead of 0.563
-_WEAKER = (
-    "Frames failed, so the predictors 'previous frame' and 'another insertion' had fewer wires to guess from: the "
-    "skill may look better than it is."
-)
+def _weaker(statistics: Mapping[str, Any]) -> str:
+    """That predictors which guess from other wires had fewer of them, where frames failed.
+
+    A lost half of an insertion took the partner of "another insertion": 0.926 instead of 0.563.
+    """
+    previous, another = (predictor_label(name) for name in ("previous", "another"))
+    others = number(statistics.get("null_another_rms_mm")) != NOTHING
+    whose = f"the predictors {previous!r} and {another!r}" if others else f"the predictor {previous!r}"
+    return f"Frames failed, so {whose} had fewer wires to guess from: the skill may look better than it is."
 
 
 def _of_frames(statistics: Mapping[str, Any]) -> str:
@@ -267,12 +278,7 @@ def _of_frames(statistics: Mapping[str, Any]) -> str:
 
 
 def _interval_of(least: float) -> str:
-    return f"its interval {'has no lower end' if least == -inf else f'reaches {_at_least(least, number(least))}'}"
-
-
-def _at_least(skill: float, text: str) -> str:
-    """A skill in words: how far below LEAST_TOLD it is says no more, since a rival's error may be next to nothing."""
-    return text if skill >= LEAST_TOLD else f"below {LEAST_TOLD:g}"
+    return f"its interval {'has no lower end' if least == -inf else f'reaches {skill_told(least)}'}"
 
 
 def _rival(name: str) -> str:

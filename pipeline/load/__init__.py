@@ -108,6 +108,15 @@ def load(header: Header, box: Box | None = None, config: LoadConfig = LoadConfig
     return Volume(read_only(values), header.spacing_mm, origin, header.direction, header.assumed, made_of)
 
 
+def of_several_greys(volume: Volume, source: Source) -> Volume:
+    """The voxels; LoadError where they have one grey only, as of a scan that was not written, which shows no wire."""
+    least, most = volume.values.min(), volume.values.max()
+    if least < most:
+        return volume
+    why = f"all {volume.values.size} voxels around the vessel have one grey, {least:g}; expected a scan of it"
+    raise unusable(source, f"{why}; export it again")
+
+
 def _read(header: Header, box: Box, config: LoadConfig) -> NDArray[Any]:
     """Voxels of a box as the file holds them; of a scan that is cut out of it, counted from where that begins."""
     whole = header.whole or header

@@ -189,7 +189,7 @@ def result_of(case: Case, known: Known, summary: dict[str, Any], key: str, detai
         | _events(f)
         for f in known.frames
     ]
-    good = "every frame is ok" if case.compared else FrameStatus.SIMULATED.value
+    good = "every frame has a result" if case.compared else FrameStatus.SIMULATED.value
     worst = next((f.sentence for f in known.frames if not f.ok), good)
     sentence = str(known.failure) if known.failure else worst
     head = (case.id, case.role, case.group, summary["status"], sentence)

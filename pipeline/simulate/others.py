@@ -76,13 +76,13 @@ def oddity(
     wrong = _misplaced(points_mm, entry_mm, direction)
     if not wrong:
         return ""
-    readings = [*_readings(points_mm, unit)]
+    ways = [*readings(points_mm, unit)]
     index = points_mm / UNITS_MM[unit]
     if scan is not None and np.abs(index).max() <= max(scan.shape):
-        readings.insert(0, ("in voxels", scan.to_mm(index)))
+        ways.insert(0, ("in voxels", scan.to_mm(index)))
     # one that only just passes, too, explains nothing
     near = 0.5 * AT_ENTRY_MM
-    for name, other in readings:
+    for name, other in ways:
         if _misplaced(other, entry_mm, direction, near):
             continue
         # what lies behind the entry's plane is in the introducer, and no part of a depth
@@ -106,7 +106,7 @@ def _misplaced(points_mm: Array, entry_mm: Array, direction: Array, near_mm: flo
     return ""
 
 
-def _readings(points_mm: Array, unit: str) -> Iterator[tuple[str, Array]]:
+def readings(points_mm: Array, unit: str) -> Iterator[tuple[str, Array]]:
     """Other readings of the numbers (point order, axes, units), each with its points; fewest changes first."""
     orders = {"": points_mm, "read from its other end (tip first)": points_mm[::-1]}
     spaces = {"": np.eye(3), "RAS": np.diag(MIRROR)}

@@ -12,6 +12,7 @@ from pipeline.load.curves import read_curve, read_truth
 from pipeline.load.guard import is_folder, status_of
 from pipeline.load.views import read_views
 from pipeline.load.wires import read_wires
+from pipeline.model import Array
 from pipeline.simulate.others import oddity
 from pipeline.status import nearest
 from pipeline.study.case_rules import not_one_per_frame
@@ -157,19 +158,23 @@ def entry_problems(case: Case, scans: Scans) -> list[str]:
     header = scans.first
     if header is None:
         return []
-    problems, middle = [], 0.5 * (np.array(header.shape) - 1.0)
+    problems, middle, grid = [], 0.5 * (np.array(header.shape) - 1.0), header.grid
+
+    def held(place: Array) -> bool:
+        return bool(np.all(np.abs(grid.to_index(place) - middle) <= middle + 0.5))
+
     seeds = [point for point in case.lumen_seed_mm if point != case.entry_mm]
     for name, points in (("entry_mm", [case.entry_mm]), ("lumen_seed_mm", seeds)):
         if not points:
             continue
-        index = header.grid.to_index(points)
+        index = grid.to_index(points)
         for point, voxel in zip(points, index, strict=True):
             if np.any(voxel < -0.5) or np.any(voxel > np.array(header.shape) - 0.5):
-                fits = fitting(point, lambda p: bool(np.all(np.abs(header.grid.to_index(p) - middle) <= middle + 0.5)))
+                fits = fitting(point, held, header.grid)
                 corners = header.grid.to_mm([[0, 0, 0], [n - 1 for n in header.shape]]).round(1).tolist()
                 problems.append(
                     f"{name} {list(point)} lies outside the scan (voxel {voxel.round(1).tolist()} of "
                     f"{list(header.shape)}); the scan spans {corners[0]} to {corners[1]} mm in LPS; "
-                    f"{fits or 'is the point in RAS, or in voxels?'}"
+                    f"{fits or 'check its coordinates'}"
                 )
     return list(dict.fromkeys(problems))

@@ -23,13 +23,20 @@ LEAST_TWIST, MOST_TWIST, ROD_TWIST = 0.01, 3.0, 0.77
 of 0.3): a coil about a core bends stiffly for its twist or twists stiffly for its bend; a unit is 1000 or more off."""
 MOST_TURNED_DEG = 450.0
 """A pigtail turns by a whole turn and somewhat more; a curve per cm in place of one per mm turned a tip by 550."""
-STIFFER_TIP = 1.5
-"""How much stiffer than its far end the tip is at least where it is doubted."""
+TURNED_ROUND = 1.5
+"""How many times as stiff as its far end the tip is at least, or the far end as curved as the tip, to be doubted."""
+COUNT_FROM_TIP = "profiles count from the tip, is it turned round?"
+STRAIGHT = 0.01
+"""Of the largest curvature: what lies in the vessel is straight up to that."""
 
 
 def implausible(cases: Iterable[Case]) -> list[str]:
     """Sentences on the wires of these cases, a wire of several cases once."""
-    return list(dict.fromkeys(f"wire {case.wire.name!r}: {text}" for case in cases for text in _oddities(case.wire)))
+    return list(dict.fromkeys(f"wire {case.wire.name!r}: {text}" for case in cases for text in _of_case(case)))
+
+
+def _of_case(case: Case) -> list[str]:
+    return [*_oddities(case.wire), *_curved_elsewhere(case.wire, max(case.insertion_mm or (np.inf,)))]
 
 
 def _rod_of_1_gpa(radius_mm: float) -> float:
@@ -71,12 +78,30 @@ def _oddities(wire: Wire) -> Iterator[str]:
             f"weight_N_per_mm = {wire.weight_N_per_mm:.3g}: a rod of tungsten of radius_mm = {radius:g} weighs "
             f"{heaviest:.2g} N/mm; is it in another unit?"
         )
-    if tip > STIFFER_TIP * shaft:
+    if tip > TURNED_ROUND * shaft:
         yield (
             f"bending_stiffness_N_mm2 is {tip:g} at the tip and {shaft:g} at its far end: guide wires are softest at "
-            "the tip; profiles count from the tip, is it turned round?"
+            f"the tip; {COUNT_FROM_TIP}"
         )
     yield from _of_twist(wire.torsional_stiffness_N_mm2, most)
+
+
+def _curved_elsewhere(wire: Wire, deepest_mm: float) -> list[str]:
+    """A sentence where a wire is curved at its far end, or nowhere within the deepest stated depth."""
+    profile = np.atleast_2d(np.abs(wire.rest_curvature_per_mm))
+    if profile.shape[1] < 2 or not profile[:, 1].any():
+        return []
+    at, curvature = profile.T
+    straight = curvature <= STRAIGHT * curvature.max()
+    inside = [*straight[at <= deepest_mm], np.interp(deepest_mm, at, curvature) <= STRAIGHT * curvature.max()]
+    if not all(inside) and curvature[-1] <= TURNED_ROUND * curvature[0]:
+        return []
+    begins = f"{at[np.flatnonzero(~straight)[0]]:g} mm from the tip"
+    beyond = f", beyond the deepest insertion_mm of {deepest_mm:g}" if all(inside) else ""
+    return [
+        f"rest_curvature_per_mm begins {begins}{beyond}, and is {curvature[-1]:g} at its far end: guide wires are "
+        f"curved at the tip; {COUNT_FROM_TIP}"
+    ]
 
 
 def _turned_deg(wire: Wire) -> float:

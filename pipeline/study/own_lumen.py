@@ -12,7 +12,9 @@ from pipeline.load import Header, LoadError, Source, parts_of
 from pipeline.load.lumens import LOOK_AT, meant_within_mm, read_lumen
 from pipeline.load.masks import mask_header
 from pipeline.model import Array, Branches, Shapes, Volume
+from pipeline.simulate.others import readings
 from pipeline.study.manifest import Case
+from solver.grid import Grid
 
 NEAR_MM = 20.0
 """An entry further than this from the box of the own lumen was not meant for it."""
@@ -107,8 +109,18 @@ def _box(low: Array, high: Array) -> str:
     return f"{low.round(1).tolist()} to {high.round(1).tolist()} mm in LPS"
 
 
-def fitting(point_mm: ArrayLike, within: Callable[[Array], bool]) -> str:
-    """What a point that lies outside would be within as; empty where nothing simple helps."""
-    point, turned = np.asarray(point_mm), np.array([-1.0, -1.0, 1.0])
-    ways = {"RAS? With its first two signs changed": point * turned, "metres? Times 1000": 1e3 * point}
-    return next((f"is it in {how}, {p.round(3).tolist()}, it lies there" for how, p in ways.items() if within(p)), "")
+def fitting(point_mm: ArrayLike, within: Callable[[Array], bool], scan: Grid | None = None) -> str:
+    """What a point that lies outside would be within as; empty where nothing simple helps.
+
+    At most two changes, as of axes and unit, explain anything; and divided by 1000 all points are one. scan : whose
+    voxels its numbers may be.
+    """
+    point = np.asarray(point_mm, float)[None]
+    ways = [(name, p[0]) for name, p in readings(point, "mm") if name.count(" and ") < 2 and "µm" not in name]
+    ways.sort(key=lambda way: way[0] != "RAS")
+    if scan is not None and np.all((point >= 0.0) & (point <= np.array(scan.shape) - 1.0)):
+        ways.append(("in voxels", scan.to_mm(point)[0]))
+    fits = ((name, p) for name, p in ways if within(p))
+    name, p = next(fits, ("", point[0]))
+    how = f"in {name}" if name.startswith("RAS") else name
+    return f"is it {how}? Read so, {(p.round(3) + 0.0).tolist()}, it lies there" if name else ""

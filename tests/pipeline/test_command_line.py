@@ -558,8 +558,11 @@ def test_what_cannot_be_read_hides_nothing_else_of_its_case(
 @pytest.mark.parametrize(
     ("entry", "told"),
     [
-        ([-50.0, -60.0, 5.0], "is it in RAS? With its first two signs changed, [50.0, 60.0, 5.0], it lies there"),
-        ([0.05, 0.06, 0.005], "is it in metres? Times 1000, [50.0, 60.0, 5.0], it lies there"),
+        ([-50.0, -60.0, 5.0], "is it in RAS? Read so, [50.0, 60.0, 5.0], it lies there"),
+        ([0.05, 0.06, 0.005], "is it in m? Read so, [50.0, 60.0, 5.0], it lies there"),
+        ([5.0, 6.0, 0.5], "is it in cm? Read so, [50.0, 60.0, 5.0], it lies there"),
+        ([5.0, 60.0, 50.0], "is it written as z, y, x? Read so, [50.0, 60.0, 5.0], it lies there"),
+        ([-5.0, -6.0, 0.5], "is it in RAS and in cm? Read so, [50.0, 60.0, 5.0], it lies there"),
         ([500.0, 0.0, 0.0], "is one of them in RAS, or in another unit than mm?"),
     ],
 )

@@ -12,7 +12,6 @@ import pytest
 from pipeline.run.log import Log
 from pipeline.run.stages.depths import (
     drawn_back,
-    in_another_order,
     in_step,
     on_another_scale,
     perhaps_turned,
@@ -26,6 +25,7 @@ from pipeline.run.stages.depths import (
 from pipeline.run.stages.dim_ends import barely_seen, faint_ends, own_dim_ends
 from pipeline.run.stages.gaps import own_gaps
 from pipeline.run.stages.known import Frame
+from pipeline.run.stages.misstated import as_steps, in_another_order
 from pipeline.run.stages.repeated import kept, once
 from pipeline.run.stages.trace import _in_step, _last_curve, _Part
 from pipeline.run.stages.way import with_depths
@@ -153,6 +153,29 @@ def test_a_scale_that_is_off_is_told_where_depths_were_read_well() -> None:
     assert sum(map(len, by_hand)) <= 4
 
 
+@pytest.mark.parametrize("scale", [0.9, 0.95, 1.05, 1.1])
+def test_a_wrong_voxel_size_of_a_few_depths_is_no_wrong_zero(scale: float) -> None:
+    """By 10 % five depths were told to be counted from elsewhere, by 5 % nothing was said: a line was not sure."""
+    stated, read = np.array([8.2, 15.8, 22.8, 30.4, 37.7]), np.array([0.2, -0.15, -0.15, -0.05, 0.2])
+    seen = frames([*(scale * stated + read)], [*stated])
+    (said,) = on_another_scale(seen, from_entry(seen))
+    assert float(said.partition("grow ")[2].partition(" times")[0]) == pytest.approx(scale, abs=0.01)
+    for lengths in (stated - 1.5, stated - 1.5 + read, stated + 2.0 * read):
+        other = frames([*lengths], [*stated])
+        assert not on_another_scale(other, from_entry(other))
+
+
+def test_right_depths_are_hardly_ever_told_to_be_on_another_scale() -> None:
+    """Read to 0.5 mm, from an entry that is off by 0.17 mm as a rule, or from a wrong zero."""
+    rng = np.random.default_rng(0)
+    told = 0
+    for off in [0.0, 1.5] * 500:
+        lengths = np.array(DEPTHS[:5]) + off + rng.normal(scale=COMMON_MM) + rng.normal(scale=0.5, size=5)
+        seen = frames([*lengths], DEPTHS[:5])
+        told += len(on_another_scale(seen, from_entry(seen)))
+    assert told <= 5
+
+
 @pytest.mark.parametrize(("deviations", "told"), [(8.0, False), (9.0, True), (-8.0, False), (-9.0, True)])
 def test_a_scale_may_be_wrong_either_way(deviations: float, told: bool) -> None:
     """Of four degrees of freedom a slope is 8.6 standard deviations off by chance once in 1000, to one side 7.2."""
@@ -200,6 +223,22 @@ def test_frames_in_another_order_are_named_as_such() -> None:
         assert not in_another_order(other, from_entry(other), 2.0)
     unknown = frames(DEPTHS[:2], [float("nan")] * 2)
     assert not in_another_order(unknown, from_entry(unknown), 2.0)
+
+
+def test_depths_given_as_increments_are_asked_about() -> None:
+    """ "The wire is replayed as drawn back there" was all that was said of four frames that failed by their lengths."""
+    steps = list(np.diff(DEPTHS, prepend=0.0))
+    seen = frames(DEPTHS, steps)
+    (said,) = as_steps(seen, from_entry(seen), 2.0)
+    assert said.endswith(
+        "(frame 5: 30.0 mm, stated 4, sum 30.0): are these increments? State the depth of each frame, counted from "
+        "entry_mm"
+    )
+    assert Caveats(warnings=[said]).against
+    assert not as_steps(seen[:2], from_entry(seen[:2]), 2.0)
+    for lengths, stated in ((DEPTHS, DEPTHS), (DEPTHS[::-1], DEPTHS), (steps, steps), (DEPTHS, [np.nan] * 6)):
+        other = frames(lengths, stated)
+        assert not as_steps(other, from_entry(other), 2.0)
 
 
 def test_too_few_frames_or_no_depths_say_nothing() -> None:

@@ -16,7 +16,17 @@ import pytest
 import SimpleITK as sitk
 
 from pipeline.arrays.grids import corners_mm
-from pipeline.load import Crop, LoadError, Source, each_volume, load, outside, read_header, require_same_geometry
+from pipeline.load import (
+    Crop,
+    LoadError,
+    Source,
+    each_volume,
+    load,
+    of_several_greys,
+    outside,
+    read_header,
+    require_same_geometry,
+)
 from pipeline.load.config import LoadConfig
 from pipeline.load.files import parts as file_parts
 from pipeline.run.hashing import file_hash
@@ -403,6 +413,17 @@ def test_voxels_that_are_no_grey_are_refused(tmp_path: Path, kind: str, grey: fl
     sitk.WriteImage(image(values, kind), str(tmp_path / "scan.mha"))
     with pytest.raises(LoadError, match="1 voxels are NaN, infinite or beyond 1e"):
         load(read_header(tmp_path / "scan.mha"))
+
+
+def test_a_scan_of_one_grey_is_told_as_such(tmp_path: Path) -> None:
+    """A frame of zeros was told as a faint wire: "got 5.8 mm of line; scan with more dose"."""
+    sitk.WriteImage(image(np.zeros_like(numbered())), str(tmp_path / "scan.mha"))
+    header = read_header(tmp_path / "scan.mha")
+    with pytest.raises(LoadError, match=r"scan.mha: all \d+ voxels around the vessel have one grey, 0; expected"):
+        of_several_greys(load(header), header.source)
+    sitk.WriteImage(image(), str(tmp_path / "scan.mha"))
+    several = load(read_header(tmp_path / "scan.mha"))
+    assert of_several_greys(several, header.source) is several
 
 
 @pytest.mark.parametrize(("change", "accepted"), [(1e-8, True), (0.05, True), (0.3, False)])

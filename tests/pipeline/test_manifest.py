@@ -196,6 +196,12 @@ def test_broken_toml_and_no_file(tmp_path: Path) -> None:
 SECOND = GOOD.split("[[case]]")[1].replace("run1", "run2")
 
 
+def test_a_table_of_a_case_at_the_top_is_told_where_it_belongs(tmp_path: Path) -> None:
+    said = problems(tmp_path, f"{GOOD}[wall]\nstiffness_N_mm2 = 2.0\n")
+    assert "wall: unknown key; it belongs to a case: write it below its [[case]], a table as [case.wall]" in said
+    assert "walls: unknown key; allowed: case, schema, wires" in problems(tmp_path, f"{GOOD}[walls]\n")
+
+
 def test_a_clamp_is_borrowed_from_another_case(tmp_path: Path) -> None:
     first, second = read_manifest(written(tmp_path, f'{GOOD}\n[[case]]{SECOND}\nentry = "case:run1"\n')).cases
     assert second.entry_case is not None
@@ -231,6 +237,10 @@ def test_a_clamp_cannot_be_borrowed_from_nowhere_or_in_a_ring(tmp_path: Path) ->
             "rest_curvature_per_mm turns the wire by 550 degrees in all: pigtails turn by 360 or so, and what turns "
             "more lies in itself; is it in degrees, per cm",
         ),
+        (
+            ("[30.0, 5.0]]", "[30.0, 5.0]]\nrest_curvature_per_mm = [[0, 0], [72, 0], [72, 0.12], [80, 0.12]]"),
+            "rest_curvature_per_mm begins 72 mm from the tip, and is 0.12 at its far end: guide wires are curved at",
+        ),
         (("[30.0, 5.0]]", "[30.0, 5.0]]\nweight_N_per_mm = 7e-3"), "weight_N_per_mm = 0.007: a rod of"),
         (("[30.0, 5.0]]", "[30.0, 5.0]]\ntorsional_stiffness_N_mm2 = 5e-6"), "torsional_stiffness_N_mm2 = 5e-06 is 1e"),
         (("[30.0, 5.0]]", "[30.0, 5.0]]\ntorsional_stiffness_N_mm2 = 5e6"), "torsional_stiffness_N_mm2 = 5e+06 is 1e"),
@@ -242,6 +252,28 @@ def test_a_wire_in_another_unit_is_a_warning(tmp_path: Path, change: tuple[str, 
     text = GOOD.replace(*change).replace('wire = "soft"', 'wire = "soft"\ndown = [0, 0, 1]')
     notes = implausible(read_manifest(written(tmp_path, text)).cases)
     assert f"wire 'soft': {said}" in notes[0]
+
+
+@pytest.mark.parametrize(
+    ("profile", "depths", "told"),
+    [
+        (
+            "[[0, 0], [72, 0], [72, 0.12], [80, 0.12], [80, 0]]",
+            "[8, 20, 38]",
+            ", beyond the deepest insertion_mm of 38",
+        ),
+        ("[[0, 0], [72, 0], [72, 0.12], [80, 0.12], [80, 0]]", "[8, 20, 73]", ""),
+        ("[[0, 0], [2, 0], [2, 0.1], [8, 0.1], [8, 0]]", "[5, 6, 7]", ""),
+        ("[[0, 0.12], [8, 0.12], [8, 0]]", "[5, 6, 7]", ""),
+        ("0.05", "[5, 6, 7]", ""),
+        ("[[0, 0], [30, 0]]", "[5, 6, 7]", ""),
+    ],
+)
+def test_a_rest_curve_that_no_frame_holds_is_a_warning(tmp_path: Path, profile: str, depths: str, told: str) -> None:
+    """Counted from the wire's end nothing was said; the wire was straight in every frame."""
+    text = GOOD.replace("[30.0, 5.0]]", f"[30.0, 5.0]]\nrest_curvature_per_mm = {profile}")
+    notes = implausible(read_manifest(written(tmp_path, f"{text}insertion_mm = {depths}\n")).cases)
+    assert [told in text and "is it turned round?" in text for text in notes] == [True] * bool(told)
 
 
 @pytest.mark.parametrize(("stiffness", "told"), [(2e6, True), (0.002, True), (0.03, False), (100.0, False)])

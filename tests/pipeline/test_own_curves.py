@@ -6,6 +6,8 @@ import json
 import re
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -21,6 +23,7 @@ from pipeline.run.stages.own_curves import (
     CORNER_VOXELS,
     LONGER,
     _in_lumen,
+    as_given,
     corner_mm,
     jagged,
     known_by_tip,
@@ -307,6 +310,15 @@ def test_a_share_that_is_hardly_too_large_is_not_told_as_the_share_that_is_allow
         told = _in_lumen(Curve(points, np.full(len(z), np.nan)), lumen, 2.0).note
         shares += [float(share) for share in re.findall(r"(\S+) % of the curve lie over", told)]
     assert 25.0 < min(shares) < 25.5
+
+
+def test_a_curve_in_voxels_is_told_as_such() -> None:
+    """ "Check its coordinates", where other simulators' wires were told to be in voxels."""
+    wire = np.array([35.0, -22.0, 102.0]) + np.linspace(0.0, 20.0, 41)[:, None] * [0.0, 0.0, 1.0]
+    scan = Grid(np.zeros((60, 60, 120)), np.full(3, 0.375), np.array([26.0, -32.0, 98.0]))
+    run: Any = SimpleNamespace(case=SimpleNamespace(entry_mm=wire[0], entry_direction=[0.0, 0.0, 1.0]))
+    curve = Curve(scan.to_index(wire), np.full(len(wire), np.nan))
+    assert as_given(run, Frame(0), curve, scan, scan).message.endswith("it would if it were in voxels")
 
 
 def test_a_curve_that_a_soft_wall_yields_to_is_in_its_lumen() -> None:

@@ -12,6 +12,7 @@ from scipy.special import ndtr
 from pipeline.model import Lumen, Volume
 from pipeline.run.stages.known import Frame
 from pipeline.run.stages.trace import _first_said
+from pipeline.segment.astray import astray
 from pipeline.segment.shown import LumenDoubt, beside_the_wall
 from pipeline.status import FrameStatus
 from reports.doubts import Caveats
@@ -39,6 +40,20 @@ def scan_of(tube: Grid, contrast: float = 1000.0) -> Volume:
     rng = np.random.default_rng(5)
     grey = 100.0 + contrast * ndtr(-tube.values / (0.8 * VOXEL)) + NOISE * rng.normal(size=tube.shape)
     return Volume(grey.astype(np.int16), tube.spacing_mm, tube.origin_mm, tube.direction)
+
+
+ENTRY = helix(radius=5.0, pitch=9.0, turns=0.8)[0]
+
+
+def turned_about_entry(tube: Grid, turn: object) -> Lumen:
+    """The tube flipped or turned: it shares the entry, and what lies around it, with the right one."""
+    matrix = np.asarray(turn, float)
+    origin = matrix @ (tube.origin_mm - ENTRY) + ENTRY
+    return Lumen(replace(tube, origin_mm=origin, direction=matrix @ tube.direction))
+
+
+def told_astray(lumen: Lumen, scan: Volume) -> str:
+    return astray(lumen, scan, ENTRY, lambda _: scan)
 
 
 def larger(tube: Grid, by_mm: float) -> Lumen:
@@ -97,3 +112,40 @@ def test_a_scan_without_the_vessel_says_nothing(tube: Grid) -> None:
     assert beside_the_wall(larger(tube, 1.0), scan_of(tube, contrast=100.0)) == LumenDoubt()
     away = scan_of(tube)
     assert beside_the_wall(larger(tube, 1.0), replace(away, origin_mm=away.origin_mm + 500.0)) == LumenDoubt()
+
+
+@pytest.mark.parametrize(
+    ("turn", "fits"),
+    [
+        (np.diag([-1.0, -1.0, 1.0]), "(-x, -y, z) about the entry"),
+        (np.diag([-1.0, 1.0, 1.0]), "(-x, y, z) about the entry"),
+        (np.eye(3)[[1, 0, 2]], "(y, x, z) about the entry"),
+        (np.array([[0.866, 0.5, 0.0], [-0.5, 0.866, 0.0], [0.0, 0.0, 1.0]]), ""),
+    ],
+)
+@pytest.mark.parametrize("contrast", [1000.0, -1000.0, 600.0])
+def test_a_lumen_that_leaves_the_vessel_beyond_the_entry_is_told(
+    tube: Grid, turn: object, fits: str, contrast: float
+) -> None:
+    """RAS for LPS: its wall is right by the entry, nothing was said, and the phantom was told to be soft."""
+    told = told_astray(turned_about_entry(tube, turn), scan_of(tube, contrast))
+    assert told.startswith("the given lumen lies beside the vessel: ")
+    assert Caveats(warnings=[told]).against, "pages name it first"
+    assert told.endswith(f"with its coordinates as {fits} it lies in the vessel" if fits else "whether it is turned")
+
+
+def test_a_lumen_that_goes_with_the_vessel_is_not_told(tube: Grid) -> None:
+    """Filled in part, washed out, of another size, one branch of two, with metal in it, or hardly seen."""
+    right, scan = Lumen(tube), scan_of(tube)
+    grey = scan.values.astype(float)
+    along = (scan.to_mm(np.indices(scan.shape).reshape(3, -1).T)[:, 2] - ENTRY[2]).reshape(scan.shape)
+    half = np.where(along < 2.5, grey, 100.0 + NOISE * np.random.default_rng(6).normal(size=grey.shape))
+    decaying = 100.0 + (grey - 100.0) * np.exp(-np.clip(along, 0.0, None) / 4.0)
+    metal = np.where(tube.values < -1.2, 6000.0, grey)
+    for shown in (half, decaying, metal):
+        assert not told_astray(right, replace(scan, values=shown))
+    for other in (larger(tube, 1.0), larger(tube, -0.6), Lumen(replace(tube, origin_mm=tube.origin_mm + [0.6, 0, 0]))):
+        assert not told_astray(other, scan)
+    stump = tube.with_values(np.where(along < 3.0, tube.values, 3.0).astype(np.float32))
+    assert not told_astray(Lumen(stump), scan)
+    assert not told_astray(turned_about_entry(tube, np.diag([-1.0, -1.0, 1.0])), scan_of(tube, 100.0))

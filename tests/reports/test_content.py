@@ -43,6 +43,7 @@ def test_a_tile_may_be_the_number_that_another_column_names() -> None:
     entries = [{"column": "null_{strongest_null}_rms_mm", "label": "of", "name": "strongest_null"}]
     row = {"strongest_null": "previous", "null_previous_rms_mm": 0.5}
     assert _content.cards(entries, row) == [{"value": "0.500", "label": "of previous frame"}]
+    assert _content.cards([{"column": "skill", "label": "of it"}], {"skill": -251.0})[0]["value"] == "below -10"
     assert _content.cards(entries, {}) == _content.cards(entries, {"strongest_null": pd.NA}) == []
 
 

@@ -167,6 +167,7 @@ def test_a_folder_without_cases_is_no_reference(tmp_path: Path) -> None:
         ("rms_mm = inf", "from 0 up"),
         ("# nothing", "names no column"),
         ("rms_ratio = 0.05", "found rms_ratio: no error, .* name at least rms_mm"),
+        ("[share]\nrms_mm = 0.1", r"found \[share\] alone: no error"),
         ("insertion_mm = 5", "name at least rms_mm"),
         ("iterations = 1000\ncoverage = 2", "found iterations, coverage: no error"),
         ("null_shortest_rms_mm = 1", "name at least rms_mm"),

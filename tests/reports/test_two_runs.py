@@ -18,7 +18,7 @@ from pipeline.run.ratio import Ratio
 from reports import tables
 from reports.doubts import MADE_FROM_TRACES
 from reports.junit import Outcome, write_junit
-from reports.origin import told_alike
+from reports.origin import told_alike, what_differs
 from reports.schema import ERRORS, POINTS, SIMULATORS
 from reports.two_runs import Verdict
 from reports.two_runs_files import write
@@ -123,15 +123,50 @@ def test_what_the_manifests_state_otherwise_is_said(
             path = out / "cases" / name / "result.json"
             stated = {
                 "wire": {"radius_mm": radius_mm, "name": "w"},
-                "entry": {"entry_mm": [0, 0, 1], "used_mm": radius_mm},
+                "entry": {"entry_mm": [0, 0, 1], "used_mm": radius_mm, "roll_deg": radius_mm},
             }
             stated |= {"down": None if out == first else [0, 1, 0]}
             path.write_text(json.dumps(json.loads(path.read_text(encoding="utf-8")) | stated), encoding="utf-8")
     main(["diff", str(first), str(second)])
     said = capsys.readouterr().out
-    assert re.search(r"manifest of a, b, c: wire.radius_mm +0.18 +0.36", said)
-    assert re.search(r"manifest of a, b, c: down +\(none\) +\[0, 1, 0\]", said)
-    assert said.count("manifest of") == 2, "neither what was found, nor what an earlier version does not say"
+    assert re.search(r"manifest of a, b, c: \[wires\] radius_mm +0.18 +0.36", said)
+    assert re.search(r"manifest of a, b, c: \[\[case\]\] down +\(none\) +\[0, 1, 0\]", said)
+    assert re.search(r"manifest of a, b, c: \[\[case\]\] roll_deg +0.18 +0.36", said)
+    assert said.count("manifest of") == 3, "neither what was found, nor what an earlier version does not say"
+
+
+def test_a_comment_in_a_manifest_states_nothing_else(second: Path, tmp_path: Path) -> None:
+    """Two hashes stood there, and no word that nothing which is stated differs."""
+
+    def as_stated(out: Path, said: str) -> None:
+        path = out / "cases" / "a" / "result.json"
+        path.write_text(json.dumps(json.loads(path.read_text(encoding="utf-8")) | {"stated": said}), encoding="utf-8")
+
+    other = shutil.copytree(second, tmp_path / "other")
+    for out, text in ((second, "one"), (other, "two")):
+        shutil.rmtree(out / "cases" / "b")
+        shutil.rmtree(out / "cases" / "c")
+        as_stated(out, "same")
+        (out / "run.json").write_text(json.dumps({"manifest_sha256": text}), encoding="utf-8")
+    (row,) = what_differs(second, other)
+    assert row["what"] == "manifest (its text alone: it states the same of every case)"
+    as_stated(other, "else")
+    assert [row["what"] for row in what_differs(second, other)] == ["manifest"]
+
+
+def test_of_a_simulators_wires_the_file_that_changed_is_named(second: Path, tmp_path: Path) -> None:
+    """Two hashes of five files stood there, where scans are named."""
+    other = shutil.copytree(second, tmp_path / "other")
+    for out in (second, other):
+        path = out / "cases" / "a" / "result.json"
+        wires = [{"key": f"simulated.files[{n}]", "path": f"cur/wire_{n}.csv", "sha256": f"{n}" * 64} for n in range(3)]
+        wires[2]["sha256"] = out.name * 12
+        result = json.loads(path.read_text(encoding="utf-8"))
+        path.write_text(json.dumps(result | {"inputs": wires}), encoding="utf-8")
+    (row,) = what_differs(second, other)
+    assert row["what"] == "input of a: simulated.files"
+    assert row["before"].startswith("3 files, ")
+    assert row["after"].endswith("; other: wire_2.csv")
 
 
 def test_the_verdict_follows_what_differs_and_ends_the_text(
@@ -441,9 +476,9 @@ def test_two_scores_are_compared_simulator_by_simulator(
         tables.write(score / SIMULATORS.file, SIMULATORS, [{"simulator": name} for name in names])
         for name in names[1:]:
             shutil.copytree(own, score / "simulators" / name)
-    junit, page = tmp_path / "diff.xml", tmp_path / "diff.html"
+    junit, page, plain = tmp_path / "diff.xml", tmp_path / "diff.html", tmp_path / "diff.json"
     (scores[1] / "simulators" / "b" / "cases" / "b" / "report.html").touch()
-    assert main(["diff", *map(str, scores), "--junit", str(junit), "--html", str(page)]) == 1
+    assert main(["diff", *map(str, scores), "--junit", str(junit), "--html", str(page), "--json", str(plain)]) == 1
     said = capsys.readouterr().out.splitlines()[-1]
     assert "the worst: c, case (all), simulator present -> missing" in said
     suites = {suite.get("name"): suite for suite in ET.parse(junit).findall("testsuite")}
@@ -453,6 +488,10 @@ def test_two_scores_are_compared_simulator_by_simulator(
         "c, (all)": "1",
         "d, (all)": "0",
     }
+    differs = json.loads(plain.read_text(encoding="utf-8"))["differs"]
+    assert {"what": "simulator d", "before": "(none)", "after": "present"} in differs
+    assert "9 of 9 frames and 1 simulator worse" in said, "not 18 of two simulators"
+    assert said.count("only the second run has the simulator d") == 1
     assert 'href="new/simulators/b/cases/b/report.html"' in page.read_text(encoding="utf-8")
     capsys.readouterr()
     assert main(["diff", str(scores[0]), str(scores[0])]) == 0

@@ -191,7 +191,9 @@ def test_the_verdict_says_of_how_many_planned_frames_it_speaks() -> None:
     assert verdict(row).startswith("On 6 of 12 planned frames alone the simulated wire lies 0.200 mm"), "it came last"
     assert "On these frames the wire is better (skill 0.900) than" in verdict(row)
     assert "The wire is better (skill 0.900) than" in verdict(row | {"frames_ok": 12})
-    assert "had fewer wires to guess from: the skill may look better than it is." in verdict(row)
+    fewer = "'previous frame' had fewer wires to guess from: the skill may look better than it is."
+    assert f"the predictor {fewer}" in verdict(row), "of one insertion there is no other"
+    assert "'previous frame' and 'another insertion' had fewer wires" in verdict(row | {"null_another_rms_mm": 0.5})
     assert "planned" not in verdict(row | {"frames_ok": 12})
 
 
@@ -205,6 +207,7 @@ ROLLED = "turned by -30 degrees, the simulated wire lies 0.10 mm (rms) from the 
         (("few points",), "ok, 1 warning", "good", "1 warning below."),
         (("few points", ROLLED), "ok, 2 warnings", "poor", f"The weightiest of 2 warnings: {ROLLED}."),
         ((ROLLED,), "ok, 1 warning", "poor", f"A warning: {ROLLED}."),
+        (("as insertion_mm states?",), "ok, 1 warning", "poor", "A warning: as insertion_mm states?"),
     ],
 )
 def test_warnings_stand_before_the_word_better(warnings: tuple[str, ...], text: str, look: str, said: str) -> None:
@@ -285,6 +288,12 @@ def test_a_wrong_roll_is_guessed_at() -> None:
     said = verdict(row)  # it was said twice, and "That is worse" had lost its noun
     assert said.count("worse") == 1
     assert said.index("The wire is worse (skill -1.00)") < said.index("With an unknown roll")
+
+
+def test_what_a_terminal_warns_of_beside_the_warnings_below_is_not_lost_in_their_count() -> None:
+    """It told two warnings, and the page "1 warning below"."""
+    row = {"rms_mm": 2.0, "null_roll_unknown_rms_mm": 0.82, "skill_strongest": -1.0, "strongest_null": "roll_unknown"}
+    assert "1 more warning below." in verdict(row, caveats=Caveats(warnings=["few points"]))
 
 
 def test_a_roll_is_to_be_fitted_only_where_it_can_be_and_is_not() -> None:

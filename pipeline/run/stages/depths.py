@@ -38,6 +38,9 @@ SURELY = 6.0
 """Standard deviations from which a single such step is told: two frames of thirty that are exchanged are 9 apart."""
 LEAST_SCALE, CHANCE = 0.01, 1e-3
 """By how much a scale must be off to be told, and how often right depths may seem as wrong."""
+CLEARLY = 2.5
+"""By how many times less a wrong scale must leave than a wrong zero to be told for it, where a line is not sure of its
+slope: of right depths it is told of 1 to 2 in 1000, of those with a wrong zero, read to 0.5 mm, of 1 to 11."""
 LEAST_MM, OF_MEDIAN = 0.5, 1.25
 """By how much the zero of depths must be off to be told, and a median's standard deviation over a mean's."""
 
@@ -151,39 +154,36 @@ def _median_within(apart: Array, tips_mm: Array, read_mm: float | None) -> float
 def on_another_scale(frames: Sequence[Frame], depths_mm: Mapping[int, float]) -> list[str]:
     """A warning where traced depths grow faster, or slower, than insertion_mm. depths_mm : of ``traced_depths``.
 
-    By least squares over the stated depths; a scale that is read by hand to 0.5 mm leaves a few per cent open.
+    By least squares over the stated depths; a scale that is read by hand to 0.5 mm leaves a few per cent open. With
+    the zero right it leaves less open, and is told where a wrong zero explains clearly less.
     """
     stated, traced = _by_stated_depth(frames, depths_mm)
     if len(stated) < FEWEST:
         return []
     (slope, _), covariance = np.polyfit(stated, traced - stated, 1, cov=True)
-    deviation = float(np.sqrt(covariance[0, 0]))
-    if abs(slope) < max(LEAST_SCALE, float(stdtrit(len(stated) - 2, 1.0 - 0.5 * CHANCE)) * deviation):
-        return []
+    deviation, zero = float(np.sqrt(covariance[0, 0])), ""
+    if not _scale_told(slope, deviation, len(stated) - 2):
+        slope, left = _scale_from_zero(stated, traced - stated)
+        deviation, if_zero = left / float(np.linalg.norm(stated)), float(np.std(traced - stated, ddof=1))
+        if left * CLEARLY > if_zero or not _scale_told(slope, deviation, len(stated) - 1):
+            return []
+        zero = f"; {left:.2f} mm rms are left, {if_zero:.2f} if all were counted from elsewhere"
     return [
         f"the traced wires grow {1.0 + slope:.3f} times as fast as insertion_mm states (standard deviation "
-        f"{deviation:.2g}, {len(stated)} stated depths): is the scans' voxel size right, or the scale that depths "
-        "were read from? With a wrong size all lengths and errors are as wrong"
+        f"{deviation:.2g}, {len(stated)} stated depths{zero}): is the scans' voxel size right, or the scale that "
+        "depths were read from? With a wrong size all lengths and errors are as wrong"
     ]
 
 
-def in_another_order(frames: Sequence[Frame], depths_mm: Mapping[int, float], tolerance_mm: float) -> list[str]:
-    """A warning where the wires have the stated depths, but those of other frames. depths_mm : of ``traced_depths``."""
-    numbers = [*depths_mm]
-    stated = np.array([f.expected_mm for f in frames if f.index in depths_mm])
-    traced = np.array([depths_mm[n] for n in numbers])
-    place = np.argsort(np.argsort(traced, kind="stable"), kind="stable")
-    whose = np.argsort(stated, kind="stable")[place]
-    apart = np.abs(traced - stated)
-    if not np.any(apart > tolerance_mm) or np.any(np.abs(traced - stated[whose]) > tolerance_mm):
-        return []
-    worst = int(np.argmax(apart))
-    count = np.count_nonzero(apart > tolerance_mm)
-    return [
-        f"the traced wires have the depths that insertion_mm states, of other frames ({count} of {len(numbers)}): that "
-        f"of frame {numbers[worst]}, {traced[worst]:.1f} mm, is of frame {numbers[int(whose[worst])]}; are frames and "
-        "insertion_mm in one order?"
-    ]
+def _scale_told(slope: float, deviation: float, freedom: int) -> bool:
+    """Whether a scale is off by more than chance explains, and by enough to be told."""
+    return abs(slope) >= max(LEAST_SCALE, float(stdtrit(freedom, 1.0 - 0.5 * CHANCE)) * deviation)
+
+
+def _scale_from_zero(stated: Array, apart: Array) -> tuple[float, float]:
+    """By how much of the stated depths (n,) what they are off by (n,) grows from 0, and the rms that this leaves."""
+    slope = float(stated @ apart / (stated @ stated))
+    return slope, float(np.linalg.norm(apart - slope * stated)) / float(np.sqrt(len(stated) - 1))
 
 
 def perhaps_turned(frames: Sequence[Frame]) -> list[Frame]:

@@ -49,13 +49,13 @@ def given_curves(run: Context) -> list[Curve]:
     return [read_curve(source.path) for source in run.case.traces]
 
 
-def as_given(run: Context, frame: Frame, curve: Curve, distance: Grid) -> Frame:
+def as_given(run: Context, frame: Frame, curve: Curve, distance: Grid, scan: Grid | None) -> Frame:
     """The frame with the user's own curve, from the plane through the entry on; failed where it cannot be its wire's.
 
-    distance : the lumen's, mm.
+    distance : the lumen's, mm.     scan : whose voxels its numbers may be.
     """
     entry, direction = np.array(run.case.entry_mm), np.array(run.case.entry_direction)
-    odd = oddity(curve.points_mm, entry, direction, depth_mm=frame.expected_mm)
+    odd = oddity(curve.points_mm, entry, direction, depth_mm=frame.expected_mm, scan=scan)
     if odd:
         return frame.failed("trace", FrameStatus.TRACE_FAILED, f"{curve.source}: {odd}")
     points = begun(curve.points_mm, entry, direction)

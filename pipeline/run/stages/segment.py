@@ -15,6 +15,7 @@ from pipeline.model import Array, Lumen, Volume
 from pipeline.run.projections import slabs
 from pipeline.run.stages.known import Context, Known
 from pipeline.segment import segment
+from pipeline.segment.astray import astray
 from pipeline.segment.given import given_lumen
 from pipeline.segment.hollows import hollows
 from pipeline.segment.levels import failed
@@ -105,12 +106,17 @@ def _held_against(run: Context, known: Known, lumen: Lumen) -> LumenDoubt:
     scan = known.scans.first
     if scan is None:
         return LumenDoubt()
+
+    def around(points_mm: Array) -> Volume:
+        return run.load(Crop(scan, scan.box_of(points_mm), run.config.load))
+
     try:
-        shown = run.load(Crop(scan, scan.box_of(corners_mm(lumen.distance)), run.config.load))
+        shown = around(corners_mm(lumen.distance))
     except StageError:  # said where it is read to be traced
         return LumenDoubt()
     with run.log.timed("segment"):
-        return beside_the_wall(lumen, shown)
+        told = astray(lumen, shown, np.array(run.case.entry_mm), around)
+        return LumenDoubt(told, far=True) if told else beside_the_wall(lumen, shown)
 
 
 def scan_at_entry(run: Context, known: Known) -> ScanCrop | None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from pipeline.arrays.fingerprint import known_by
 from pipeline.arrays.grids import corners_mm
-from pipeline.load import Crop, Header
+from pipeline.load import Crop, Header, of_several_greys
 from pipeline.model import Curve, Lumen, Volume
 from pipeline.register import Anchor, Motion, anchor
 from pipeline.register.drift import FIRST, REFERENCE, EarlierScan, of_drift, with_drift
@@ -22,7 +22,6 @@ from pipeline.run.stages.beside import beside_what_is_seen
 from pipeline.run.stages.brightness import of_another_brightness
 from pipeline.run.stages.depths import (
     drawn_back,
-    in_another_order,
     in_step,
     on_another_scale,
     perhaps_turned,
@@ -37,6 +36,7 @@ from pipeline.run.stages.dim_ends import barely_seen, faint_ends, own_dim_ends
 from pipeline.run.stages.gaps import own_gaps
 from pipeline.run.stages.given import entry_sigma_mm
 from pipeline.run.stages.known import Context, Frame, Known, trusted
+from pipeline.run.stages.misstated import as_steps, in_another_order
 from pipeline.run.stages.own_curves import RESAMPLE, as_given, given_curves, rough
 from pipeline.run.stages.repeated import alike, once, rescanned
 from pipeline.run.stages.thickness import not_too_thick, too_thin
@@ -58,7 +58,8 @@ def trace_frames(run: Context, known: Known) -> Known:
     if not known.scans.frames:
         if not given:
             return known
-        own = [as_given(run, *pair, known.vessel.distance) for pair in zip(known.frames, given, strict=True)]
+        scan = None if known.scans.first is None else known.scans.first.grid
+        own = [as_given(run, *pair, known.vessel.distance, scan) for pair in zip(known.frames, given, strict=True)]
         run.log.warnings += rescanned(own, run.case.calibrated_traces)
         single = once(own, run.case.calibrated_scans, run.case.calibrated_traces)
         return _with_room(run, known, _in_step(run, single, voxel_mm))
@@ -84,9 +85,9 @@ def trace_frames(run: Context, known: Known) -> Known:
     run.log.warnings += _in_plane(frames, run.config.trace)
     assumed, doubtful = sentences_of(work.alignment, {frame.index: frame.registration for frame in frames})
     run.log.assumptions += assumed
-    run.log.warnings += doubtful + of_drift(
-        {f.index: f.curve for f in frames if f.curve is not None}, work.earlier_scan
-    )
+    # a wall that is not the vessel's fits no motion of the phantom: "it is soft and bends" sent users to scan it anew
+    run.log.warnings += [] if known.lumen_doubt else doubtful
+    run.log.warnings += of_drift({f.index: f.curve for f in frames if f.curve is not None}, work.earlier_scan)
     frames = [_first_said(frame, known.lumen_doubt) for frame in frames]
     return _with_room(run, replace(known, off_the_scans=bool(off_scans)), frames, elsewhere)
 
@@ -95,7 +96,8 @@ def _in_step(run: Context, frames: list[Frame], voxel_mm: float) -> list[Frame]:
     """The frames, those out of step not to be trusted; warnings of what lengths and own curves tell of themselves."""
     tolerance_mm = run.config.trace.length_tolerance_mm
     depths_mm = traced_depths(frames, run.case.entry_mm, run.case.entry_direction)
-    swapped = in_another_order(frames, depths_mm, tolerance_mm)
+    given = frames, depths_mm, tolerance_mm
+    swapped = in_another_order(*given) or as_steps(*given)
     run.log.warnings += swapped
     frames = frames if swapped else perhaps_turned(frames)
     common_mm = float(np.hypot(entry_sigma_mm(run.case, voxel_mm), TIP_VOXELS * voxel_mm))
@@ -206,7 +208,7 @@ class _Tracing:
     def look(self, run: Context, frame: Frame, header: Header, earlier: Earlier[_Part]) -> _Part:
         """Read, align and trace one frame; LoadError where it cannot be read."""
         log = run.log
-        volume = run.load(Crop(header, self.box, self.load), frame.index)
+        volume = of_several_greys(run.load(Crop(header, self.box, self.load), frame.index), header.source)
 
         def read_moved(motion: Motion) -> Volume:
             box = header.box_of(motion.moved(self.corners))
@@ -222,7 +224,7 @@ class _Tracing:
                 seen = with_drift(seen, volume, self.structures, self.earlier_scan)
         done = _of_scan(run, frame, seen, self.lumen)
         if self.given:
-            done = as_given(run, frame, self.given[frame.index], self.lumen.distance)
+            done = as_given(run, frame, self.given[frame.index], self.lumen.distance, header.grid)
         before = (earlier(k) for k in range(frame.index))
         window = next((part.window for part in before if part.window), None)
         if window is None and done.trusted_curve is not None:
