@@ -50,7 +50,7 @@ LEAST_TOLD = -10.0
 
 def skill_told(skill: float, text: str = "") -> str:
     """A skill in words: how far below LEAST_TOLD it is says no more, since a rival's error may be next to nothing."""
-    return f"below {LEAST_TOLD:g}" if skill < LEAST_TOLD else text or number(skill)
+    return (text or number(skill)) if skill >= LEAST_TOLD else f"below {LEAST_TOLD:g}"
 
 
 def _shown(value: Any, column: Column) -> str:

@@ -22,7 +22,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     add("name", nargs="?", metavar="NAME", help="a scene of the catalogue; --list names them")
     add("-o", "--out", type=Path, metavar="DIR", help="folder for the study")
     add("--list", action="store_true", help="name the scenes, each with its reason")
-    add("--anatomy", type=Path, metavar="FILE", help="vessel tree, .swc or .mrk.json with radii")
+    add("--anatomy", type=Path, metavar="FILE", help="vessel tree, .swc or .mrk.json with radii; smoothed if jagged")
     add(
         "--background",
         type=Path,

@@ -114,8 +114,15 @@ def _held_against(run: Context, known: Known, lumen: Lumen) -> LumenDoubt:
         shown = around(corners_mm(lumen.distance))
     except StageError:  # said where it is read to be traced
         return LumenDoubt()
+
+    def wider(points_mm: Array) -> Volume:
+        try:
+            return around(points_mm)
+        except StageError:  # what lies beyond the lumen's box need not be readable
+            return shown
+
     with run.log.timed("segment"):
-        told = astray(lumen, shown, np.array(run.case.entry_mm), around)
+        told = astray(lumen, shown, np.array(run.case.entry_mm), wider)
         return LumenDoubt(told, far=True) if told else beside_the_wall(lumen, shown)
 
 
