@@ -46,9 +46,16 @@ class Greys(NamedTuple):
         return np.asarray(np.abs(grey - self.vessel) < 0.5 * abs(self.vessel - self.around))
 
 
-def astray(lumen: Lumen, scan: Volume, entry_mm: Array, wider: Callable[[Array], Volume]) -> str:
+class Entry(NamedTuple):
+    """Where the wire goes in (3,), LPS mm, and its direction (3,) there."""
+
+    at_mm: Array
+    direction: Array
+
+
+def astray(lumen: Lumen, scan: Volume, entry: Entry, wider: Callable[[Array], Volume]) -> str:
     """A sentence where a lumen leaves the vessel that a scan shows. wider : the scan around points (n, 3), LPS mm."""
-    voxel = float(np.max(scan.spacing_mm))
+    voxel, entry_mm = float(np.max(scan.spacing_mm)), entry.at_mm
     points, depth = _deep(lumen, DEEP_VOXELS * voxel)
     away = np.linalg.norm(points - entry_mm, axis=1)
     if len(points) < LEAST_NEAR:
@@ -60,7 +67,8 @@ def astray(lumen: Lumen, scan: Volume, entry_mm: Array, wider: Callable[[Array],
         return ""
     seen = _within(scan, points)
     share = 1.0 - float(np.mean(greys.like_vessel(_mean_around(scan, points[seen])))) if seen.any() else 0.0
-    place = _left_at(lumen, scan, near, radius, greys) if share >= ASTRAY else None
+    beyond = _beyond(scan, entry, greys) if share >= ASTRAY else None
+    place = None if beyond is None else _left_at(lumen, scan, near, radius, beyond)
     if place is None:
         return ""
     axes = _axes_that_fit(points, entry_mm, greys, wider)
@@ -107,12 +115,22 @@ def _greys(lumen: Lumen, scan: Volume, near_mm: Array, radius_mm: float) -> Grey
     return found if abs(found.vessel - found.around) > LEAST_NOISES * noise else None
 
 
-def _left_at(lumen: Lumen, scan: Volume, near_mm: Array, radius_mm: float, greys: Greys) -> Array | None:
-    """Where (3,), LPS mm, the vessel of the entry first lies outside the lumen; None where less than its width does."""
-    voxel = float(np.max(scan.spacing_mm))
+def _beyond(scan: Volume, entry: Entry, greys: Greys) -> NDArray[np.bool_]:
+    """Voxels with the vessel's grey beyond the entry: the inlet before it is no way out of the lumen."""
     # noise would lead from voxel to voxel through what is around
     smooth = ndimage.gaussian_filter(scan.values, BLUR_VOXELS, output=np.float32)
-    parts, _ = ndimage.label(greys.like_vessel(smooth))
+    x, y, z = np.ogrid[tuple(map(slice, scan.shape))]
+    steps = scan.to_mm(np.eye(3)) - scan.origin_mm
+    along = (scan.origin_mm - entry.at_mm) @ entry.direction
+    for index, step in zip((x, y, z), steps @ entry.direction, strict=True):
+        along = along + index * step
+    return np.asarray(greys.like_vessel(smooth) & (along > 0.0))
+
+
+def _left_at(lumen: Lumen, scan: Volume, near_mm: Array, radius_mm: float, vessel: NDArray[np.bool_]) -> Array | None:
+    """Where (3,), LPS mm, the vessel of the entry first lies outside the lumen; None where less than its width does."""
+    voxel = float(np.max(scan.spacing_mm))
+    parts, _ = ndimage.label(vessel)
     at = np.rint(scan.to_index(near_mm[_within(scan, near_mm)])).astype(int)
     counts = np.bincount(parts[tuple(at.T)])
     counts[0] = 0

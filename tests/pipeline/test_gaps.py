@@ -153,7 +153,7 @@ def test_a_gap_that_nothing_explains_is_a_warning_and_a_stated_depth_ends_all_do
     assert own_gaps(stated, 0.3) == (stated, [])
 
 
-def test_frames_that_end_at_one_point_while_their_gaps_grow_are_refused():
+def test_frames_that_end_at_one_point_beyond_gaps_that_grow_are_refused():
     """A fragment that stayed at 22 to 26 mm while the rest was pulled back: four frames were ok."""
     seen = [replace(f) for f in frames([12.0, 26.1, 26.0, 26.2, 26.1], [NAN] * 5)]
     for n, gap_mm in ((2, 1.5), (3, 3.4), (4, 5.3)):
@@ -162,8 +162,16 @@ def test_frames_that_end_at_one_point_while_their_gaps_grow_are_refused():
         seen[n] = replace(seen[n], curve=replace(curve, levels={BEYOND_GAP: 4.0, GAP: gap_mm}))
     found, said = own_gaps(seen, 0.35)
     assert [f.status for f in found] == ["ok", "ok", *["trace_ambiguous"] * 3]
-    assert "in 4 frames (1, 2, 3, 4), though the gap before it is 1.5 mm long in one and 5.3" in found[2].message
+    assert "in 4 frames (1, 2, 3, 4), in 4.0 mm of line that stay where they are while" in found[2].message
     assert not said
+    # a wire that is held, beside a clot that hides more of it or a streak that moves, has another line beyond the gap
+    for beyond_mm in ((6.5, 4.6, 2.7), (10.0, 7.0, 4.0)):
+        held = [
+            replace(f, curve=replace(f.curve, levels={BEYOND_GAP: beyond, GAP: gap_mm}))
+            for f, beyond, gap_mm in zip(seen[2:], beyond_mm, (1.5, 3.4, 5.3), strict=True)
+            if f.curve is not None
+        ]
+        assert all(f.ok for f in own_gaps(held, 0.35)[0])
     stated = [replace(f, expected_mm=26.0) for f in seen]
     assert all(f.ok for f in own_gaps(stated, 0.35)[0])
     assert all(f.ok for f in own_gaps(gapped([40.0, 44.0, 48.0], [10.0, 14.0, 3.0]), 0.35)[0])

@@ -12,7 +12,7 @@ from scipy.special import ndtr
 from pipeline.model import Lumen, Volume
 from pipeline.run.stages.known import Frame
 from pipeline.run.stages.trace import _first_said
-from pipeline.segment.astray import astray
+from pipeline.segment.astray import Entry, astray
 from pipeline.segment.shown import LumenDoubt, beside_the_wall
 from pipeline.status import FrameStatus
 from reports.doubts import Caveats
@@ -42,7 +42,8 @@ def scan_of(tube: Grid, contrast: float = 1000.0) -> Volume:
     return Volume(grey.astype(np.int16), tube.spacing_mm, tube.origin_mm, tube.direction)
 
 
-ENTRY = helix(radius=5.0, pitch=9.0, turns=0.8)[0]
+PATH = helix(radius=5.0, pitch=9.0, turns=0.8)
+ENTRY, AHEAD = PATH[0], (PATH[1] - PATH[0]) / np.linalg.norm(PATH[1] - PATH[0])
 
 
 def turned_about_entry(tube: Grid, turn: object) -> Lumen:
@@ -53,7 +54,7 @@ def turned_about_entry(tube: Grid, turn: object) -> Lumen:
 
 
 def told_astray(lumen: Lumen, scan: Volume) -> str:
-    return astray(lumen, scan, ENTRY, lambda _: scan)
+    return astray(lumen, scan, Entry(ENTRY, AHEAD), lambda _: scan)
 
 
 def larger(tube: Grid, by_mm: float) -> Lumen:
@@ -142,7 +143,11 @@ def test_a_lumen_that_goes_with_the_vessel_is_not_told(tube: Grid) -> None:
     half = np.where(along < 2.5, grey, 100.0 + NOISE * np.random.default_rng(6).normal(size=grey.shape))
     decaying = 100.0 + (grey - 100.0) * np.exp(-np.clip(along, 0.0, None) / 4.0)
     metal = np.where(tube.values < -1.2, 6000.0, grey)
-    for shown in (half, decaying, metal):
+    places = scan.to_mm(np.indices(scan.shape).reshape(3, -1).T)
+    back = (places - ENTRY) @ AHEAD
+    aside = np.linalg.norm(places - ENTRY - back[:, None] * AHEAD, axis=1)
+    inlet = np.where(((back < 0.0) & (aside < 1.5)).reshape(scan.shape), 1100.0, half)
+    for shown in (half, decaying, metal, inlet):
         assert not told_astray(right, replace(scan, values=shown))
     for other in (larger(tube, 1.0), larger(tube, -0.6), Lumen(replace(tube, origin_mm=tube.origin_mm + [0.6, 0, 0]))):
         assert not told_astray(other, scan)

@@ -2,7 +2,7 @@
 
 A wire's own gap goes with its tip, a streak makes one that stays where it is. What already lay ahead of the wire's tip
 in another frame, and stayed there while the wire came nearer, is no part of it: a line, or the marker of a catheter.
-Nor is what stays where it is while the gap before it changes, or what a deeper wire goes past.
+Nor is what stays where it is while the wire comes nearer to it, or what a deeper wire goes past.
 """
 
 from collections.abc import Sequence
@@ -79,24 +79,30 @@ def _pushed_along(frames: Sequence[Frame]) -> list[str]:
 
 
 def _left_behind(frames: list[Frame], voxel_mm: float) -> list[Frame]:
-    """The frames; those fail that end at one point beyond gaps that grow or shrink: what lies there does not move.
+    """The frames; those fail that end at one point, and in one line, of which the wire before the gap came nearer.
 
     A wire that is pushed or drawn takes its end along; what stays has broken off, or is another device. Frames of 9, 12
     and 15 mm of wire ended at 29 mm, where a second wire began at 17 mm, and were ok.
     """
-    curves = [f.trusted_curve if np.isnan(f.expected_mm) else None for f in frames]
-    seen = {n: c for n, c in enumerate(curves) if c is not None}
+    seen = {n: f.trusted_curve for n, f in enumerate(frames) if np.isnan(f.expected_mm)}
+    curves = {n: curve for n, curve in seen.items() if curve is not None}
     out = list(frames)
-    for n, curve in seen.items():
-        end = curve.points_mm[-1]
-        there = [m for m, c in seen.items() if np.linalg.norm(c.points_mm[-1] - end) < STAYED_VOXELS * voxel_mm]
-        gaps = [seen[m].levels[GAP] for m in there if GAP in seen[m].levels]
-        if GAP in curve.levels and len(there) >= FEWEST and np.ptp(gaps) > AGREE_VOXELS * voxel_mm:
+    for n, curve in curves.items():
+        end, lies = curve.points_mm[-1], curve.levels.get(BEYOND_GAP, np.nan)
+        there = [m for m, c in curves.items() if np.linalg.norm(c.points_mm[-1] - end) < STAYED_VOXELS * voxel_mm]
+        levels = [(curves[m].length_mm, curves[m].levels) for m in there if BEYOND_GAP in curves[m].levels]
+        before = [
+            long - of[BEYOND_GAP] - of[GAP]
+            for long, of in levels
+            if abs(of[BEYOND_GAP] - lies) < AGREE_VOXELS * voxel_mm
+        ]
+        if len(there) >= FEWEST and before and np.ptp(before) > CAME_NEARER_MM:
             note = (
                 f"trace: wire: got an end at one point in {len(there)} frames "
-                f"({listed([str(frames[m].index) for m in there])}), though the gap before it is {min(gaps):.1f} mm "
-                f"long in one and {max(gaps):.1f} mm in another; expected an end that moves with the wire; what lies "
-                "there has broken off, or is another device: look at the picture, or state insertion_mm"
+                f"({listed([str(frames[m].index) for m in there])}), in {lies:.1f} mm of line that stay where they are "
+                f"while the wire before them ends {min(before):.1f} mm deep in one and {max(before):.1f} mm in "
+                "another; expected an end that moves with the wire; what lies there has broken off, or is another "
+                "device: look at the picture, or state insertion_mm"
             )
             out[n] = frames[n].failed("trace", FrameStatus.TRACE_AMBIGUOUS, note)
     return out
