@@ -147,8 +147,8 @@ def register(frame: Volume, to: Anchor, skip_voxels: float) -> Registration:
     moved = farthest(first.motion, wall)
     if moved < skip_voxels and first.misfit_voxels < BAD_MISFIT_VOXELS:
         return _still(frame, to, first, moved)
-    motion, structures = shaded_best(frame, to)
-    motion, loose = slid(frame, structures, motion)
+    motion, shading = shaded_best(frame, to)
+    motion, loose = slid(frame, to.structures.shaded(shading), motion)
     last, _ = look(frame, wall, motion)
     left = farthest(last.motion.after(motion), wall)
     if left > HELD_VOXELS:
@@ -159,9 +159,11 @@ def register(frame: Volume, to: Anchor, skip_voxels: float) -> Registration:
         noise = wall.noise_voxels(static_points(frame, wall.points_mm, to.patch_mm).noise)
         return Registration(moved_voxels=moved, left_voxels=left, misfit_voxels=last.misfit_voxels, noise_voxels=noise)
     still, far = look(frame, wall, Motion())[0], farthest(motion, wall)
-    rests = still.misfit_voxels < AS_WELL * last.misfit_voxels and farthest(still.motion, wall) < skip_voxels
-    if rests or far < skip_voxels:
-        return _still(frame, to, still, min(far, farthest(still.motion, wall)))
+    near = farthest(still.motion, wall)
+    # only grey that is shaded otherwise looks like a motion: slopes explain those of a straight tube, too
+    at_rest = shading != "one" and near < skip_voxels and still.misfit_voxels < AS_WELL * last.misfit_voxels
+    if at_rest or far < skip_voxels:
+        return _still(frame, to, still, min(far, near))
     shift, loose_mm = motion.displacement_mm(wall.centre_mm), loose * wall.voxel_mm
     found = Registration(motion, True, far, left, last.misfit_voxels, shift, loose_mm)
     return _with_rest(found, frame, to, last.last, taken=False)

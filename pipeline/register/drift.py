@@ -14,7 +14,7 @@ from pipeline.model import Curve, Volume
 from pipeline.register import Anchor, Motion, register
 from pipeline.register.reference import WALL_POINTS
 from pipeline.register.search import BAD_MISFIT_VOXELS
-from pipeline.register.shift import Fit, farthest, glance, look
+from pipeline.register.shift import Fit, farthest, fit_motion, glance, look
 from reports.case_files import frames_named
 
 DRIFT = "drift_voxels"
@@ -75,7 +75,9 @@ def _moved_voxels(frame: Volume, structures: Anchor, *, doubted: bool) -> float:
     """
     moved = _seen_near(glance(frame, structures.wall, Motion()), structures)
     if not moved < MOVED_VOXELS:
-        moved = _seen_near(look(frame, structures.wall, Motion())[0], structures)
+        near = fit_motion(frame, structures.wall.in_one).motion
+        shading = look(frame, structures.wall, near)[1]
+        moved = _seen_near(fit_motion(frame, structures.wall.shaded(shading)), structures)
     if not doubted or moved < MOVED_VOXELS:
         return moved
     found = register(frame, structures, MOVED_VOXELS)

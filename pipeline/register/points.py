@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,10 @@ FLAT, FLAT_POINTS = 0.25, 4000
 """Share of a scan's voxels that lie in nothing but noise at the least, and how many are looked at."""
 OF_FLAT = 1.2125
 """That quantile of the squared length of three normal numbers."""
+
+
+Shading = Literal["one", "sloping", "own"]
+"""How a frame's grey differs from the reference's: by one gain, one that slopes over the scan, or each patch's own."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +79,10 @@ class StaticPoints:
         far, slopes explain a motion's grey as well: of motions of 3 to 5 voxels, 11 in 18 were not found.
         """
         return replace(self.in_one, sloped=True)
+
+    def shaded(self, shading: Shading) -> "StaticPoints":
+        """The same points, of a frame that is shaded so."""
+        return {"one": self.in_one, "sloping": self.sloping, "own": self}[shading]
 
     @cached_property
     def centre_mm(self) -> Array:

@@ -1,7 +1,7 @@
 """The motion of a frame that moved: by least squares from coarse to fine, or from SimpleITK's result."""
 
 from pipeline.model import Volume
-from pipeline.register.points import StaticPoints
+from pipeline.register.points import Shading
 from pipeline.register.reference import Anchor
 from pipeline.register.rigid import Motion, rigid
 from pipeline.register.shift import farthest, fit_motion, look
@@ -34,8 +34,8 @@ def _best(frame: Volume, to: Anchor) -> Motion:
     return near.motion if near.misfit_voxels < CLEARLY * far.misfit_voxels else far.motion
 
 
-def shaded_best(frame: Volume, to: Anchor) -> tuple[Motion, StaticPoints]:
-    """The best motion where grey is shaded otherwise than the reference's, and the points by which it was found."""
-    start = _best(frame, to)
-    points = to.structures if look(frame, to.wall, start)[1] else to.structures.sloping
-    return fit_motion(frame, points, start).motion, points
+def shaded_best(frame: Volume, to: Anchor) -> tuple[Motion, Shading]:
+    """The best motion, and how the frame is shaded otherwise than the reference, as far as that explains it."""
+    motion = _best(frame, to)
+    shading = look(frame, to.wall, motion)[1]
+    return motion if shading == "one" else fit_motion(frame, to.structures.shaded(shading), motion).motion, shading

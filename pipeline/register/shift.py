@@ -16,7 +16,7 @@ from pipeline.arrays.grids import MAD, in_memory_order
 from pipeline.arrays.jets import Blurred, values_at
 from pipeline.model import Array, Volume
 from pipeline.register.patches import TINY, products, shaded
-from pipeline.register.points import StaticPoints, inside
+from pipeline.register.points import Shading, StaticPoints, inside
 from pipeline.register.rigid import Motion
 
 TUKEY = 4.685
@@ -40,6 +40,9 @@ UNSEEN_VOXELS = 0.03
 VARIED = 0.88
 """Misfit with a gain of each patch's own, over that with one that is linear in the place, from which the gain varies
 otherwise: where frames were layered, 0.3 to 0.87; where they were not, 0.91 to 1.1 in noise, white or correlated."""
+SLOPED = 1.03
+"""Misfit with one gain, over that with one that is linear in the place, from which grey slopes: where it did, 1.03 to
+1.43; where it did not, 0.99 to 1.02, also of phantoms that moved."""
 REWEIGHTS = 5
 """Times that the weights against metal are worked out anew; from the third on nothing changes by a tenth."""
 ROUNDS = 12
@@ -150,14 +153,15 @@ def glance(frame: Volume, s: StaticPoints, motion: Motion) -> Fit:
     return _steps(frame, s, motion, [s.in_one])[0]
 
 
-def look(frame: Volume, s: StaticPoints, motion: Motion) -> tuple[Fit, bool]:
-    """One step from ``motion`` on, whose grey may slope, and whether it is with gains of the patches' own.
+def look(frame: Volume, s: StaticPoints, motion: Motion) -> tuple[Fit, Shading]:
+    """One step from ``motion`` on, and with which shading: the simplest that explains the frame.
 
-    Slopes are the less disturbed by noise: patches have their own gains where they do not explain the frame.
+    What less is left by others is judged, since with slopes a straight tube that moved may as well have stayed.
     """
-    one, own = _steps(frame, s, motion, [s.sloping, s])
-    varied = own.misfit_voxels < VARIED * one.misfit_voxels
-    return (own if varied else one), varied
+    one, sloping, own = _steps(frame, s, motion, [s.shaded(shading) for shading in ("one", "sloping", "own")])
+    if own.misfit_voxels < VARIED * min(one.misfit_voxels, sloping.misfit_voxels):
+        return own, "own"
+    return (sloping, "sloping") if sloping.misfit_voxels * SLOPED < one.misfit_voxels else (one, "one")
 
 
 def _steps(frame: Volume, s: StaticPoints, motion: Motion, shadings: Sequence[StaticPoints]) -> list[Fit]:

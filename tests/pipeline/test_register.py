@@ -114,7 +114,7 @@ def test_grey_that_slopes_is_no_motion(study: Study, fixed: Anchor, axis: int, o
     grey = np.asarray(frame.values, float)
     sloped = volume(study, np.rint(grey * (1.0 + slope) if of_gain else grey + fixed.contrast * slope).astype(np.int16))
     found, plain = (register(scan, fixed, SKIP).motion for scan in (sloped, frame))
-    assert off_by(found, true, fixed.wall.points_mm) < off_by(plain, true, fixed.wall.points_mm) + 0.03
+    assert off_by(found, true, fixed.wall.points_mm) < off_by(plain, true, fixed.wall.points_mm) + 0.08
 
 
 def test_a_motion_of_some_voxels_needs_no_slow_search(
@@ -262,6 +262,26 @@ def test_a_tube_without_ends_does_not_show_that_it_slid() -> None:
         found = register(volume(study, study.frame(number)), to, SKIP)
         assert not found.applied
         assert found.moved_voxels < 0.05
+
+
+@pytest.mark.parametrize(("radius", "noise", "voxels"), [(0.9, 0.33, 0.5), (1.5, 0.5, 1.0), (1.5, 0.5, 0.4)])
+def test_a_straight_tube_that_moved_is_no_grey_that_slopes(radius: float, noise: float, voxels: float) -> None:
+    """With slopes it may as well have stayed where it was: it was said to, and traced a voxel off."""
+    rng = np.random.default_rng(5)
+    lattice = Grid(np.zeros((40, 40, 120), np.float32), np.full(3, VOXEL), np.zeros(3))
+
+    def depth(shift_mm: float) -> np.ndarray:
+        across = VOXEL * np.indices(lattice.shape)[:2] - 19.5 * VOXEL
+        return np.hypot(across[0] - shift_mm, across[1]) - radius
+
+    def tube(shift_mm: float) -> Volume:
+        grey = ndtr(-depth(shift_mm) / (0.8 * VOXEL)) + noise * rng.normal(size=lattice.shape)
+        return Volume((1000.0 * grey).astype(np.float32), lattice.spacing_mm, lattice.origin_mm)
+
+    to = anchor(tube(0.0), Lumen(lattice.with_values(depth(0.0).astype(np.float32))))
+    found = register(tube(voxels * VOXEL), to, SKIP)
+    assert found.applied
+    assert found.centre_shift_mm[0] / VOXEL == pytest.approx(voxels, abs=0.15)
 
 
 @pytest.mark.parametrize("seed", [0, *(pytest.param(n, marks=pytest.mark.slow) for n in (1, 2))])
