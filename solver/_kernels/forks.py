@@ -65,6 +65,8 @@ def back_again(handle: Any, k: int, outcome: int, energy: float, other: float) -
     if problem.shaft.drag > 0.0:
         total_energy(problem, CURRENT, 0, k)
     handle.report[0] = handle.report[2]
+    # the step's own relaxation met an unstable state, or there would have been no look to the other side
+    problem.scratch.descent[0].forked = 1
     return apart if apart > tol.APART_MM else 0.0
 
 

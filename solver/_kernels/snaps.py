@@ -11,6 +11,7 @@ from solver import _tolerances as tol
 from solver._kernels.algebra import farthest, load3, store3
 from solver._kernels.chain import segments_at
 from solver._kernels.data import CONVERGED, CURRENT, LAST_GOOD, ROUGH, Problem
+from solver._kernels.energy import energy_of
 from solver._kernels.flags import inlined, merged
 from solver._kernels.forces import push_force
 from solver._kernels.free_body import work_on
@@ -55,7 +56,7 @@ def account(handle: Any, k: int, reached: tuple[float, float, float], used: int,
     moved = way_of_joints(problem, at, k, handle.table.segment) if free or used > tol.SWIFT else 0.0
     leapt = moved > tol.SNAP_WAYS * balance.way
     doubtful = newton and (doubt(balance, used, at.shrink, report.pivot, moved) or (leapt and gives_way(ahead)))
-    rough = newton and ahead.way > 0.0 and astray(handle, ahead, used, moved)
+    rough = newton and (hops(handle, balance, used) or (ahead.way > 0.0 and astray(handle, ahead, used, moved)))
     # shorter steps do not make a wire more certain if it is free to turn, and in doubt already
     since_doubt = at.rough_since_doubt if pending else at.since_doubt
     already_uncertain = report.pivot < tol.FREE and since_doubt < tol.DOUBT_LASTS_MM
@@ -149,6 +150,20 @@ def beyond_catheter(handle: Any, k: int, depth: float, balance: WorkBalance) -> 
     large = tol.WORK_SHARE * work + tol.ENERGY_SHARE * energy + _least_energy(handle.problem, k)
     push, torque, pull = balance.push, balance.torque, balance.pull
     return WorkBalance(push, torque, pull, balance.way, balance.share, missing, missing, large, change, balance.gives)
+
+
+@merged
+def hops(handle: Any, balance: WorkBalance, used: int) -> bool:
+    """Whether a wire may have hopped over a barrier, as at the neck of a sac; no reason to doubt shorter steps as well.
+
+    Not where the relaxation began far above: from there it meets unstable states on any way.
+    """
+    problem, missing, large = handle.problem, balance.missing, balance.large
+    if handle.report[0].start > tol.FAR_ABOVE * energy_of(problem, CURRENT):
+        return False
+    if problem.scratch.descent[0].forked != 0 and abs(missing) > tol.FORKS * large:
+        return True
+    return used > tol.SWIFT and missing < -large - tol.CHANGE_SHARE * balance.share * balance.change
 
 
 @merged

@@ -11,6 +11,8 @@ import pytest
 from solver import GuideWire, Insertion, Solution, VesselWall, relax, skips
 from tests.solver.scenes import Array, bend_distance, bend_grid, sampled, tube_grid
 
+DEPTHS = np.arange(1.0, 33.0)
+
 
 def ringed(p: Array) -> Array:
     """A tube with a ring on its wall at z = 12 mm that leaves 0.9 mm: a curved tip catches on it, and turns back."""
@@ -111,6 +113,40 @@ def test_no_hop_past_a_sharp_edge_is_silent(n: int) -> None:
         assert true.converged
         assert mine.uncertain or np.linalg.norm(mine.joints_mm - true.joints_mm, axis=1).max() < 0.01
     assert sum(mine.uncertain for mine in default) <= 15, "of 27"
+
+
+def with_sacs(n: int) -> tuple[GuideWire, VesselWall, float]:
+    """A bend of a random width with two sacs at its side, and a soft wire for it."""
+    r = np.random.default_rng([2, n])
+    radius, inlet, lumen, sacs = r.uniform(5, 12), r.uniform(6, 12), r.uniform(0.8, 1.6), []
+    for _ in range(2):
+        angle, side, size = r.uniform(0.2, 1.4), r.normal(size=3), r.uniform(1.5, 3)
+        at = np.array([radius * (1 - np.cos(angle)), 0.0, inlet + radius * np.sin(angle)])
+        sacs.append((at + side / np.linalg.norm(side) * (lumen + 0.3 * size), size))
+
+    def distance(p: Array) -> Array:
+        plain = bend_distance(p, radius, inlet, lumen)
+        return np.asarray(np.minimum(plain, np.min([np.linalg.norm(p - at, axis=-1) - size for at, size in sacs], 0)))
+
+    wall = VesselWall(sampled(distance, 0.4, (-5, -5, -2), (22, 5, 30)), float(10 ** r.uniform(-0.5, 1.5)))
+    soft, curved = 10 ** r.uniform(-1, 1), r.uniform(0, 0.3)
+    wire = GuideWire(0.5, 0.15, [[0, soft], [15, 5 * soft], [30, 10 * soft]], [[0, curved], [8, curved], [8, 0]])
+    return wire, wall, float(r.uniform(-180, 180))
+
+
+@pytest.mark.parametrize("n", [92, 117, 203])
+def test_no_hop_at_the_neck_of_a_sac_is_silent(n: int) -> None:
+    """The relaxation met an unstable state, but missed little of the work: up to 22 mm off from there on, unflagged."""
+    wire, wall, roll = with_sacs(n)
+    default, short = (
+        list(Insertion(wire, wall, [0, 0, 0], [0, 0, 1], material_axis=[1, 0, 0], step_mm=step).to_depths(DEPTHS, roll))
+        for step in (1.0, 0.05)
+    )
+    for mine, true in zip(default, short, strict=True):
+        assert mine.converged
+        assert true.converged
+        assert mine.uncertain or np.linalg.norm(mine.joints_mm - true.joints_mm, axis=1).max() < 0.01
+    assert sum(mine.uncertain for mine in default) <= 20, "of 32"
 
 
 def sphere(p: Array) -> Array:

@@ -1,7 +1,7 @@
-"""Do shorter steps lead elsewhere under a catheter? ``python -m tests.studies.necks --seed 101 --scenes 100``.
+"""Do shorter steps lead elsewhere at a neck? ``python -m tests.studies.necks --seed 101 --scenes 100``.
 
-Random winding vessels with sacs at their sides; a soft wire whose tip is 14 mm ahead of a stiff catheter's, every
-millimetre of depth: the default's steps against steps of 0.05 mm.
+Random winding vessels with sacs at their sides; a soft wire whose tip is 14 mm ahead of a stiff catheter's, or with
+``--ahead inf`` no catheter, every millimetre of depth: the default's steps against steps of 0.05 mm.
 """
 
 from __future__ import annotations
@@ -39,8 +39,10 @@ def vessel(rng: np.random.Generator) -> VesselWall:
     return VesselWall(Grid(distance.astype("float32"), np.full(3, voxel), low), 10 ** rng.uniform(-0.5, 2))
 
 
-def pushed(seed: int, index: int, to_mm: float = 50.0, step_mm: float = 1.0) -> list[Solution]:
-    """The wire of a scene at every millimetre."""
+def pushed(
+    seed: int, index: int, to_mm: float = 50.0, step_mm: float = 1.0, ahead_mm: float = AHEAD_MM
+) -> list[Solution]:
+    """The wire of a scene at every millimetre; its tip is ``ahead_mm`` ahead of the catheter's, inf for none."""
     rng = np.random.default_rng([seed, index])
     wall, tip = vessel(rng), 10 ** rng.uniform(-0.5, 0.7)
     knee, shaft = rng.uniform(8, 15), tip * 10 ** rng.uniform(0.3, 1.2)
@@ -53,17 +55,18 @@ def pushed(seed: int, index: int, to_mm: float = 50.0, step_mm: float = 1.0) -> 
         quadrature=str(rng.choice(["tip", "joints"])),
     )  # fmt: skip
     depths = np.arange(1.0, to_mm + 0.5)
-    return list(insertion.to_depths(depths, roll, np.maximum(depths - AHEAD_MM, 0.0).tolist()))
+    return list(insertion.to_depths(depths, roll, np.maximum(depths - ahead_mm, 0.0).tolist()))
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seed", type=int, default=101)
     parser.add_argument("--scenes", type=int, default=100)
+    parser.add_argument("--ahead", type=float, default=AHEAD_MM)
     given = parser.parse_args()
     rest, iterations = [], 0
     for index in range(given.scenes):
-        found, short = pushed(given.seed, index), pushed(given.seed, index, step_mm=SHORT_MM)
+        found, short = (pushed(given.seed, index, step_mm=step, ahead_mm=given.ahead) for step in (1.0, SHORT_MM))
         iterations += sum(s.iterations for s in found)
         pairs = zip(found, short, strict=True)
         rest += [(one.uncertain, apart_mm(one, other)) for one, other in pairs if one.converged and other.converged]
