@@ -110,6 +110,15 @@ def test_how_well_own_curves_are_known_can_be_stated(tmp_path: Path, stated: flo
     assert errors["trace_sigma_mm"].tolist() == pytest.approx([np.nan if stated is None else stated] * 4, nan_ok=True)
 
 
+def test_what_is_stated_of_own_curves_needs_some(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """It had no effect, and nobody said so."""
+    manifest = write_study(tmp_path)
+    text = "".join(line for line in MANIFEST.splitlines(keepends=True) if not line.startswith("traces"))
+    manifest.write_text(f"{text}[case.uncertainty]\ntraces_mm = 0.05\n", encoding="utf-8")
+    assert main(["check", str(manifest)])
+    assert "uncertainty.traces_mm = 0.05: it is of own curves" in capsys.readouterr().err
+
+
 def test_a_curve_of_few_points_is_warned_of(tmp_path: Path) -> None:
     """As 3D Slicer saves control points, which it shows as a spline: straight lines pass 0.2 mm beside it."""
     sparse = [resample(wire, 8.0) for wire in WIRES]
