@@ -26,8 +26,8 @@ MOST_TURNED_DEG = 450.0
 TURNED_ROUND = 1.5
 """How many times as stiff as its far end the tip is at least, or the far end as curved as the tip, to be doubted."""
 SET_PER_MM = 0.01
-"""Curvature up to which a bend is no shaped tip's: the hoop that a wire is packed in, of 100 mm radius or more, leaves a
-shaft bent all along."""
+"""Curvature up to which a bend is no shaped tip's: the hoop that a wire is packed in, of 100 mm radius or more, leaves
+a shaft bent all along."""
 COUNT_FROM_TIP = "profiles count from the tip, is it turned round?"
 STRAIGHT = 0.01
 """Of the largest curvature: what lies in the vessel is straight up to that."""

@@ -61,7 +61,7 @@ def test_a_scan_in_other_units_is_the_same_scan(kind: str) -> None:
     values = np.random.default_rng(2).integers(0, 99, (7, 9, 11))
     keys = {known_by(Volume((gain * values + offset).astype(kind))) for gain in (1, 2) for offset in (0, 3, 50)}
     assert len(keys) == 1
-    assert known_by(Volume(np.zeros((3, 3, 3), kind))) not in keys
+    assert known_by(Volume(np.zeros((3, 3, 3), kind))) == ""
 
 
 SIGMA = 0.03
