@@ -69,8 +69,8 @@ def how_many(rows: pd.DataFrame) -> str:
     bad = rows[rows["verdict"] == "regression"]
     held = rows[rows["frame"].notna() & (rows["verdict"] != "new")].drop_duplicates(by)
     frames, whole = bad[bad["frame"].notna()].drop_duplicates(by), bad[bad["frame"].isna()]
-    gone = int((whole["column"] == "simulator").sum())
+    lost, gone = whole[whole["column"] != "simulator"].drop_duplicates("case"), whole[whole["column"] == "simulator"]
     parts = [f"{len(frames)} of {counted(len(held), 'frame')}"] * (len(frames) > 0)
-    parts += [counted(n, what) for n, what in ((len(whole) - gone, "case"), (gone, "simulator")) if n]
+    parts += [counted(len(some), what) for some, what in ((lost, "case"), (gone, "simulator")) if len(some)]
     values = len(bad) - len(whole)
     return f"{' and '.join(parts)} worse" + f", in {values} values" * (values > len(frames))

@@ -20,6 +20,8 @@ from reports.tolerance import allowed_of, columns_in
 
 FITTED = "roll_fitted"
 _LACKING = "in no frame"
+_SCAN = ["case", "frame"]
+"""What tells frames apart: those of several simulators are of one scan, and count once."""
 CLOSING = ("regression", "moved")
 """Verdicts on a row for which a gate must close."""
 _HEADER = ["case", "frame", "column", "before", "after", "change", "allowed", "verdict"]
@@ -112,14 +114,15 @@ class Difference:
         if self.unscored:
             tail += f"; not compared, since one run alone has them and they count in no score: {listed(self.unscored)}"
         mended = self.rows[(self.rows["column"] == "status") & (self.rows["verdict"] == "better")]
-        mended = mended[~mended["before"].isin(GOOD)]
+        mended = mended[~mended["before"].isin(GOOD)].drop_duplicates(_SCAN)
         if len(mended):
             places = [f"{row['case']} frame {row['frame']}" for row in mended.to_dict("records")]
             tail += f"; {counted(len(mended), 'frame')} that failed {'is' if len(mended) == 1 else 'are'} ok now: "
             tail += listed(places)
         if len(self.new):
-            failed = int((~self.new["after"].isin([*GOOD, "present"])).sum())
-            tail += f"; held against nothing, since only the second run has them: {counted(len(self.new), 'frame')}"
+            new = self.new.drop_duplicates(_SCAN)
+            failed = len(self.new[~self.new["after"].isin([*GOOD, "present"])].drop_duplicates(_SCAN))
+            tail += f"; held against nothing, since only the second run has them: {counted(len(new), 'frame')}"
             tail += f", {failed} of which failed" * bool(failed)
         come = self.rows[(self.rows["verdict"] == "new") & (self.rows["column"] == "simulator")]
         if len(come):

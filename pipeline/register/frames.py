@@ -68,10 +68,13 @@ def counters_of(found: Registration | None) -> dict[str, float]:
     return {"registration_applied": found.applied, "registration_skipped": not found.applied}
 
 
-def sentences_of(alignment: Alignment, found: Mapping[int, Registration | None]) -> tuple[list[str], list[str]]:
+def sentences_of(
+    alignment: Alignment, found: Mapping[int, Registration | None], *, wall_right: bool = True
+) -> tuple[list[str], list[str]]:
     """Assumptions and warnings of the report: skipped frames in one sentence, registered ones one by one.
 
-    found : of each frame, by its number.
+    found : of each frame, by its number.     wall_right : whether the lumen is the vessel's. A wall that is not fits no
+    motion of the phantom: "it is soft and bends" sent users to scan it anew.
     """
     if alignment.anchor is None:
         return [alignment.reason], []
@@ -92,7 +95,7 @@ def sentences_of(alignment: Alignment, found: Mapping[int, Registration | None])
         if not r.trusted or (r.applied and r.doubt):
             doubtful.setdefault(r.sentence, []).append(n)
     told = [f"{frames_in_words(numbers)}: {text}" for text, numbers in doubtful.items()]
-    return texts, told + _of_rests([(n, r.rests) for n, r in known])
+    return texts, told + (_of_rests([(n, r.rests) for n, r in known]) if wall_right else [])
 
 
 def _of_rests(known: Sequence[tuple[int, tuple[Rest, ...]]]) -> list[str]:

@@ -116,8 +116,12 @@ def _absent(case: Case) -> Iterator[tuple[Path, str]]:
 
 
 def _told_problems(case: Case, count: int | None, absent: Container[Path]) -> list[str]:
-    """What is wrong with the roll, the truth and the projections. count : of the frames."""
-    problems = []
+    """What is wrong with the roll, what is stated of traces, the truth and the projections. count : of the frames."""
+    problems, sigma_mm = [], case.uncertainty.traces_mm
+    if sigma_mm is not None and not case.traces:
+        problems.append(
+            f"uncertainty.traces_mm = {sigma_mm:g}: it is of own curves, and the case names no traces; leave it out"
+        )
     seen = count if case.frames or case.traces else 0
     if case.roll_deg == "fit" and case.role == "validation" and seen is not None and seen < 2:
         said = "the first one is what it is fitted on, and is not scored; give a number, or two frames or more"

@@ -25,18 +25,26 @@ MOST_TURNED_DEG = 450.0
 """A pigtail turns by a whole turn and somewhat more; a curve per cm in place of one per mm turned a tip by 550."""
 TURNED_ROUND = 1.5
 """How many times as stiff as its far end the tip is at least, or the far end as curved as the tip, to be doubted."""
+SET_PER_MM = 0.01
+"""Curvature up to which a bend is no shaped tip's: the hoop that a wire is packed in, of 100 mm radius or more, leaves
+a shaft bent all along."""
 COUNT_FROM_TIP = "profiles count from the tip, is it turned round?"
 STRAIGHT = 0.01
 """Of the largest curvature: what lies in the vessel is straight up to that."""
 
 
 def implausible(cases: Iterable[Case]) -> list[str]:
-    """Sentences on the wires of these cases, a wire of several cases once."""
-    return list(dict.fromkeys(f"wire {case.wire.name!r}: {text}" for case in cases for text in _of_case(case)))
-
-
-def _of_case(case: Case) -> list[str]:
-    return [*_oddities(case.wire), *_curved_elsewhere(case.wire, max(case.insertion_mm or (np.inf,)))]
+    """Sentences on the wires of these cases, a wire of several cases once, with the deepest insertion of all."""
+    cases, deepest_mm = list(cases), dict[str, float]()
+    for case in cases:
+        here_mm = max(case.insertion_mm or (np.inf,))
+        deepest_mm[case.wire.name] = max(here_mm, deepest_mm.get(case.wire.name, 0.0))
+    told = (
+        f"wire {wire.name!r}: {text}"
+        for wire in (case.wire for case in cases)
+        for text in (*_oddities(wire), *_curved_elsewhere(wire, deepest_mm[wire.name]))
+    )
+    return list(dict.fromkeys(told))
 
 
 def _rod_of_1_gpa(radius_mm: float) -> float:
@@ -89,19 +97,19 @@ def _oddities(wire: Wire) -> Iterator[str]:
 def _curved_elsewhere(wire: Wire, deepest_mm: float) -> list[str]:
     """A sentence where a wire is curved at its far end, or nowhere within the deepest stated depth."""
     profile = np.atleast_2d(np.abs(wire.rest_curvature_per_mm))
-    if profile.shape[1] < 2 or not profile[:, 1].any():
+    if profile.shape[1] < 2 or profile[:, 1].max() <= SET_PER_MM:
         return []
     at, curvature = profile.T
     straight = curvature <= STRAIGHT * curvature.max()
     inside = [*straight[at <= deepest_mm], np.interp(deepest_mm, at, curvature) <= STRAIGHT * curvature.max()]
-    if not all(inside) and curvature[-1] <= TURNED_ROUND * curvature[0]:
+    if all(inside):
+        begins_mm = at[np.flatnonzero(~straight)[0] - 1]  # the knot before: of a step, it lies there, too
+        what = f"begins {begins_mm:g} mm from the tip, where the deepest insertion_mm is {deepest_mm:g}"
+    elif curvature[-1] > max(SET_PER_MM, TURNED_ROUND * curvature[0]):
+        what = f"is {curvature[0]:g} at the tip and {curvature[-1]:g} at its far end"
+    else:
         return []
-    begins = f"{at[np.flatnonzero(~straight)[0]]:g} mm from the tip"
-    beyond = f", beyond the deepest insertion_mm of {deepest_mm:g}" if all(inside) else ""
-    return [
-        f"rest_curvature_per_mm begins {begins}{beyond}, and is {curvature[-1]:g} at its far end: guide wires are "
-        f"curved at the tip; {COUNT_FROM_TIP}"
-    ]
+    return [f"rest_curvature_per_mm {what}: guide wires are curved at the tip, most of all; {COUNT_FROM_TIP}"]
 
 
 def _turned_deg(wire: Wire) -> float:

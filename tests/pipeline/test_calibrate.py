@@ -641,14 +641,15 @@ def test_a_single_stated_depth_is_not_known_exactly(monkeypatch):
     assert depth_offset(found, fit)[1] == pytest.approx(np.sqrt(2.0) * SAME_MM)
 
 
+@pytest.mark.parametrize("stated", ["", "uncertainty = { traces_mm = 0.0 }", "uncertainty = { traces_mm = 0.03 }"])
 @pytest.mark.parametrize("off_mm", [0.0, 0.002])
-def test_a_case_whose_traces_are_those_of_another_is_left_out(study, off_mm):
+def test_a_case_whose_traces_are_those_of_another_is_left_out(study, off_mm, stated):
     """Three copies counted as three insertions, without a word: the roll was known to 2.9 degrees for 5."""
     for n in range(3):
         points = np.loadtxt(study / f"{n}.csv", delimiter=",", skiprows=1) + [off_mm, 0.0, 0.0]
         np.savetxt(study / f"again{n}.csv", points, delimiter=",", header="x,y,z", comments="")
     text = STUDY.replace('traces = ["3.csv"]', 'traces = ["again0.csv", "again1.csv", "again2.csv"]')
-    text = text.replace("[9.0]", "[8.0, 10.0, 12.0]").replace('id = "b"', 'id = "b"\nrole = "calibration"')
+    text = text.replace("[9.0]", "[8.0, 10.0, 12.0]").replace('id = "b"', f'id = "b"\nrole = "calibration"\n{stated}')
     (study / "manifest.toml").write_text(text, encoding="utf-8")
     found = gathered(read_manifest(study / "manifest.toml").cases, Config(), Store(None), lambda _: None)
     assert [case.id for case in found.cases] == ["a"]

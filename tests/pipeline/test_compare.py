@@ -287,7 +287,7 @@ def test_a_wire_that_lies_nearer_to_traces_than_these_are_known_is_no_news(
     off_mm: float, sigma_mm: float, said: int
 ) -> None:
     """A simulator that handed the traces back came first, without a word; so did own traces that were its wires."""
-    curve = Curve(np.zeros((5, 3)), np.full(5, sigma_mm))
+    curve = Curve(np.zeros((5, 3)), np.full(5, sigma_mm), source="0.csv" * bool(np.isnan(sigma_mm)))
     errors = cast(Any, SimpleNamespace(error_mm=np.full(40, off_mm)))
     warnings = _too_near([Frame(0, curve=curve, comparison=errors), Frame(1)], 0.5, handed=True)
     assert len(warnings) == said
@@ -303,13 +303,16 @@ def test_one_frame_that_was_made_from_its_trace_is_enough() -> None:
     assert said.startswith("in 4 frames (0, 2, 3, 4) the simulated wires lie within 0.002 mm (rms) of the traced ones")
 
 
+@pytest.mark.parametrize("sigma_mm", [np.nan, 0.0, 0.03])
 @pytest.mark.parametrize(("off_mm", "said"), [(0.0085, 0), (0.0004, 1)])
-def test_curves_of_another_program_may_lie_near_the_solvers_own_wires(off_mm: float, said: int) -> None:
+def test_curves_of_another_program_may_lie_near_the_solvers_own_wires(
+    off_mm: float, said: int, sigma_mm: float
+) -> None:
     """A rod without segments, given as traces, lay 0.0085 mm off: "made from the traces", and no score. Written to the
-    micrometre, the solver's own are 0.0004 mm off."""
+    micrometre, the solver's own are 0.0004 mm off; once ``traces_mm`` was stated, nothing was said of them."""
     frame = Frame(
         0,
-        curve=Curve(np.zeros((5, 3)), np.full(5, np.nan)),
+        curve=Curve(np.zeros((5, 3)), np.full(5, sigma_mm), source="0.csv"),
         comparison=cast(Any, SimpleNamespace(error_mm=np.full(40, off_mm))),
     )
     assert len(_too_near([frame], 0.5, handed=False)) == said

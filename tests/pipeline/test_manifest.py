@@ -239,7 +239,7 @@ def test_a_clamp_cannot_be_borrowed_from_nowhere_or_in_a_ring(tmp_path: Path) ->
         ),
         (
             ("[30.0, 5.0]]", "[30.0, 5.0]]\nrest_curvature_per_mm = [[0, 0], [72, 0], [72, 0.12], [80, 0.12]]"),
-            "rest_curvature_per_mm begins 72 mm from the tip, and is 0.12 at its far end: guide wires are curved at",
+            "rest_curvature_per_mm is 0 at the tip and 0.12 at its far end: guide wires are curved at the tip",
         ),
         (("[30.0, 5.0]]", "[30.0, 5.0]]\nweight_N_per_mm = 7e-3"), "weight_N_per_mm = 0.007: a rod of"),
         (("[30.0, 5.0]]", "[30.0, 5.0]]\ntorsional_stiffness_N_mm2 = 5e-6"), "torsional_stiffness_N_mm2 = 5e-06 is 1e"),
@@ -260,9 +260,14 @@ def test_a_wire_in_another_unit_is_a_warning(tmp_path: Path, change: tuple[str, 
         (
             "[[0, 0], [72, 0], [72, 0.12], [80, 0.12], [80, 0]]",
             "[8, 20, 38]",
-            ", beyond the deepest insertion_mm of 38",
+            "begins 72 mm from the tip, where the deepest insertion_mm is 38: ",
         ),
         ("[[0, 0], [72, 0], [72, 0.12], [80, 0.12], [80, 0]]", "[8, 20, 73]", ""),
+        ("[[0, 0], [60, 0], [100, 0.1]]", "[8, 20, 38]", "begins 60 mm from the tip, where"),
+        ("[[0, 0], [100, 0.1]]", "[8, 20, 38]", "per_mm is 0 at the tip and 0.1 at its far end: "),
+        ("[[0, 0.05], [30, 0.08]]", "[8, 20, 38]", "is 0.05 at the tip and 0.08 at its far end: "),
+        ("[[0, 0], [50, 0.002]]", "[8, 20, 60]", ""),
+        ("[[0, 0], [50, 0], [60, 0.002]]", "[8, 20, 40]", ""),
         ("[[0, 0], [2, 0], [2, 0.1], [8, 0.1], [8, 0]]", "[5, 6, 7]", ""),
         ("[[0, 0.12], [8, 0.12], [8, 0]]", "[5, 6, 7]", ""),
         ("0.05", "[5, 6, 7]", ""),
@@ -274,6 +279,16 @@ def test_a_rest_curve_that_no_frame_holds_is_a_warning(tmp_path: Path, profile: 
     text = GOOD.replace("[30.0, 5.0]]", f"[30.0, 5.0]]\nrest_curvature_per_mm = {profile}")
     notes = implausible(read_manifest(written(tmp_path, f"{text}insertion_mm = {depths}\n")).cases)
     assert [told in text and "is it turned round?" in text for text in notes] == [True] * bool(told)
+
+
+def test_a_wire_is_doubted_with_the_deepest_insertion_of_its_cases(tmp_path: Path) -> None:
+    """In two cases of other depths it was told twice, though a third one's frames hold the curve."""
+    profile = "[[0, 0], [72, 0], [72, 0.12], [80, 0.12], [80, 0]]"
+    text = GOOD.replace("[30.0, 5.0]]", f"[30.0, 5.0]]\nrest_curvature_per_mm = {profile}")
+    (case,) = read_manifest(written(tmp_path, f"{text}insertion_mm = [8, 20, 38]\n")).cases
+    cases = [case.model_copy(update={"insertion_mm": depths}) for depths in ((10.0, 30.0), (10.0, 36.0), (75.0,))]
+    assert len(implausible(cases[:2])) == 1
+    assert not implausible(cases)
 
 
 @pytest.mark.parametrize(("stiffness", "told"), [(2e6, True), (0.002, True), (0.03, False), (100.0, False)])

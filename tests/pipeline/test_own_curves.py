@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+import SimpleITK as sitk
 from scipy.interpolate import CubicSpline
 
 from pipeline.arrays.polyline import resample, to_length
@@ -108,6 +109,30 @@ def test_how_well_own_curves_are_known_can_be_stated(tmp_path: Path, stated: flo
     errors = errors_of(tmp_path / "out")
     assert set(errors["status"]) == {"ok"}
     assert errors["trace_sigma_mm"].tolist() == pytest.approx([np.nan if stated is None else stated] * 4, nan_ok=True)
+
+
+def test_what_is_stated_of_own_curves_needs_some(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """It had no effect, and nobody said so."""
+    manifest = write_study(tmp_path)
+    text = "".join(line for line in MANIFEST.splitlines(keepends=True) if not line.startswith("traces"))
+    manifest.write_text(f"{text}[case.uncertainty]\ntraces_mm = 0.05\n", encoding="utf-8")
+    assert main(["check", str(manifest)])
+    assert "uncertainty.traces_mm = 0.05: it is of own curves" in capsys.readouterr().err
+
+
+def test_own_curves_need_no_wire_in_their_scans(tmp_path: Path) -> None:
+    """Scans that show one grey around the vessel failed to load, where they are only shown and compared."""
+    manifest = write_study(tmp_path)
+    (tmp_path / "frames").mkdir()
+    for n in range(len(WIRES)):
+        image = sitk.Image(24, 24, 64, sitk.sitkInt16)
+        image.SetOrigin((-9.0, -9.0, -10.0))
+        sitk.WriteImage(image + n, str(tmp_path / "frames" / f"{n}.mha"))
+    text = manifest.read_text(encoding="utf-8").replace("traces =", 'frames = "frames/*.mha"\ntraces =')
+    manifest.write_text(text, encoding="utf-8")
+    main(["run", str(manifest), "-o", str(tmp_path / "out"), "--until", "trace", "-q"])
+    result = json.loads((tmp_path / "out" / "cases" / "bend" / "result.json").read_text(encoding="utf-8"))
+    assert [frame["status"] for frame in result["frames"]] == ["ok"] * len(WIRES)
 
 
 def test_a_curve_of_few_points_is_warned_of(tmp_path: Path) -> None:

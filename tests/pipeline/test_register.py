@@ -19,6 +19,7 @@ from pipeline.register.points import static_points
 from pipeline.register.rigid import rigid
 from pipeline.register.shift import fit_motion, look
 from pipeline.register.slide import slid
+from pipeline.register.wider import Wider
 from pipeline.segment import segment
 from solver import Grid
 
@@ -180,6 +181,16 @@ def test_frames_that_fit_nowhere_are_one_warning(fixed: Anchor, lumen: Lumen) ->
     assert told.startswith(
         "frames 0 to 2, 5: no registration applied: the walls fit the reference in no place (none is"
     )
+
+
+def test_frames_that_fit_nowhere_are_told_of_a_lumen_far_off_too(fixed: Anchor, lumen: Lumen) -> None:
+    """With the doubt of the lumen all that registration says was gone, not what a wrong wall makes of it alone."""
+    alignment = alignment_of(lumen, fixed.reference, SKIP, switched_on=True, own_curves=False)
+    wider = Wider(voxels=2.0)
+    found = {0: Registration(misfit_voxels=np.inf), 1: Registration(wider=wider)}
+    assert len(sentences_of(alignment, found)[1]) == 2
+    (told,) = sentences_of(alignment, found, wall_right=False)[1]
+    assert told.startswith("frame 0: no registration applied: the walls fit")
 
 
 @pytest.mark.parametrize("sd", [200.0, 400.0])

@@ -210,6 +210,17 @@ def test_what_the_second_run_has_in_no_frame_has_moved() -> None:
         assert part.regressions["column"].tolist() == [column]
 
 
+def test_frames_and_cases_of_two_simulators_count_once() -> None:
+    """One lost case of two simulators was "2 cases", one frame that was mended "2 frames"."""
+    run = {"a": _table([_row()]), "c": _table([_row(), _row(frame=1, status="no_wire")]), "d": _table([_row()])}
+    later = {"c": _table([_row(), _row(frame=1), _row(frame=2, status="no_wire")])}
+    rows = diff.diff_tables(run, later, TOLERANCE).rows
+    said = diff.Difference(pd.concat([rows.assign(simulator=name) for name in ("x", "y")])).sentence
+    assert "compared: 2 cases worse; the worst: " in said
+    assert "; 1 frame that failed is ok now: c frame 1; " in said
+    assert said.endswith("only the second run has them: 1 frame, 1 of which failed")
+
+
 def test_errors_stand_before_what_is_none() -> None:
     """An overlap of 1.1 times what is allowed was named the worst, above a tip of another branch."""
     tolerance = {"max_penetration_mm": 0.02, "rms_mm": 0.1, "skill": 0.01}

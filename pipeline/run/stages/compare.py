@@ -122,8 +122,9 @@ LEAST_MM, APART_MM = 10.0, 1.0
 """Length of such frames from which that is no chance: with 2 mm in each of three frames it is one in 1.5 % of the cases
 of a perfect simulator. Points that are farther apart than a trace's errors reach count as many as they are."""
 NEAREST_MM, OWN_NEAREST_MM = 0.01, 0.001
-"""The same where the curves are the user's own, of unknown standard deviation: no scan shows a wire so well. Those of
-another program of the same physics may be as near to the solver's own wires (a rod without segments 0.003 to 0.04)."""
+"""The same where the curves are the user's own, whose standard deviation nobody measured: no scan shows a wire so well.
+Those of another program of the same physics may be as near to the solver's own wires (a rod without segments 0.003 to
+0.04)."""
 TRUTH_VOXELS, TRUTH_TIP_VOXELS, TRUTH_TIPS_VOXELS = 0.3, 3.0, 1.5
 """Distance of traced wires from the true ones, median of the frames' means, of the tips in any frame, and in half of
 them, voxels, from which they are not the same wires: traces lie within 0.1 voxel of the true wire, tips within one."""
@@ -174,22 +175,23 @@ def _too_near(frames: Sequence[Frame], sample_mm: float, *, handed: bool) -> lis
     handed : the wires are another simulator's. Of the solver's own, traces that were made from them are looked for.
     """
     seen = [(f.index, f.comparison.error_mm, f.curve) for f in frames if f.ok and f.comparison and f.curve]
-    each = {n: (rms(error), float(np.median(curve.sigma_mm)), len(error)) for n, error, curve in seen}
-    near = {n: (mm, sigma) for n, (mm, sigma, _) in each.items() if mm < _nearest_mm(sigma, handed=handed)}
-    if min(sample_mm, APART_MM) * sum(each[n][2] for n in near) < LEAST_MM:
+    each = {n: (rms(error), float(np.median(curve.sigma_mm))) for n, error, curve in seen}
+    least = {n: _nearest_mm(each[n][1], own=bool(curve.source), handed=handed) for n, _, curve in seen}
+    near = {n: (mm, sigma) for n, (mm, sigma) in each.items() if mm < least[n]}
+    if min(sample_mm, APART_MM) * sum(len(error) for n, error, _ in seen if n in near) < LEAST_MM:
         return []
     off, sigma = np.max(list(near.values()), axis=0)
     some = f"in {counted(len(near), 'frame')} ({listed([*map(str, near)], MOST_NAMED)}) " * (len(near) < len(each))
-    known_to = f"which are known to {sigma:.2g} mm: " if np.isfinite(sigma) else ""
+    known_to = f"which are known to {sigma:.2g} mm: " if sigma > 0.0 else ""
     return [
         f"{some}the simulated wires lie within {off:.2g} mm (rms) of the traced ones, {known_to}{MADE_FROM_TRACES}, "
         "or traces from the wires, are so near; their errors say nothing about a simulator"
     ]
 
 
-def _nearest_mm(sigma_mm: float, *, handed: bool) -> float:
-    """How near a wire may lie to a trace of this standard deviation, NaN where nobody knows it, at the least."""
-    if np.isnan(sigma_mm):
+def _nearest_mm(sigma_mm: float, *, own: bool, handed: bool) -> float:
+    """How near a wire may lie to a trace of this standard deviation at the least. own : the trace is the user's own."""
+    if own:
         return NEAREST_MM if handed else OWN_NEAREST_MM
     return NEAREST * sigma_mm if handed else 0.0
 

@@ -27,8 +27,8 @@ ONE_WIRE = 3.0
 """The same of two scans of one wire, each with noise of its own: they are traced twice their standard deviation apart
 (1.4 times along each of two axes)."""
 OWN_MM, OWN_TIP_MM = 0.03, 0.06
-"""What traces of the user's own, which state none, are taken to be known to where they are held against others, mm, per
-axis and at the tip: as those of scans with voxels of 0.3 mm."""
+"""What traces of the user's own are taken to be known to where they are held against others, mm, per axis and at the
+tip: as those of scans with voxels of 0.3 mm. What is stated of them (traces_mm) may be 0, and says nothing of tips."""
 LEAST_AGAIN = 2
 """Frames from which that is no chance: at one depth two insertions may lie alike."""
 MOST_NAMED = 3
@@ -120,8 +120,8 @@ def _again(frames: Sequence[Frame], learnt: Sequence[tuple[str, Array]], sigmas:
 
 
 def _supposed(curve: Curve) -> Curve:
-    """The curve; one of the user's own, which states no standard deviation, with that of a scan's trace."""
-    if not np.isnan(curve.sigma_mm).all():
+    """The curve; one of the user's own, whose tip states no standard deviation, with those of a scan's trace."""
+    if np.isfinite(curve.tip_sigma_mm):
         return curve
     return replace(curve, sigma_mm=np.full(len(curve.points_mm), OWN_MM), tip_sigma_mm=OWN_TIP_MM)
 

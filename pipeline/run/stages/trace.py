@@ -83,10 +83,10 @@ def trace_frames(run: Context, known: Known) -> Known:
     run.log.warnings += off_scans
     run.log.warnings += work.wire_in_reference
     run.log.warnings += _in_plane(frames, run.config.trace)
-    assumed, doubtful = sentences_of(work.alignment, {frame.index: frame.registration for frame in frames})
+    registered = {frame.index: frame.registration for frame in frames}
+    assumed, doubtful = sentences_of(work.alignment, registered, wall_right=not known.lumen_doubt)
     run.log.assumptions += assumed
-    # a wall that is not the vessel's fits no motion of the phantom: "it is soft and bends" sent users to scan it anew
-    run.log.warnings += [] if known.lumen_doubt else doubtful
+    run.log.warnings += doubtful
     run.log.warnings += of_drift({f.index: f.curve for f in frames if f.curve is not None}, work.earlier_scan)
     frames = [_first_said(frame, known.lumen_doubt) for frame in frames]
     return _with_room(run, replace(known, off_the_scans=bool(off_scans)), frames, elsewhere)
@@ -208,7 +208,9 @@ class _Tracing:
     def look(self, run: Context, frame: Frame, header: Header, earlier: Earlier[_Part]) -> _Part:
         """Read, align and trace one frame; LoadError where it cannot be read."""
         log = run.log
-        volume = of_several_greys(run.load(Crop(header, self.box, self.load), frame.index), header.source)
+        volume = run.load(Crop(header, self.box, self.load), frame.index)
+        if not self.given:  # beside the user's own curve it is only looked at
+            volume = of_several_greys(volume, header.source)
 
         def read_moved(motion: Motion) -> Volume:
             box = header.box_of(motion.moved(self.corners))
