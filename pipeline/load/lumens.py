@@ -4,6 +4,8 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from pipeline.arrays.grids import LATTICE_VOXELS, lattice_mm
 from pipeline.load.curves import SYSTEMS, markups_in, of_json, positions_of, unit_of_markup
@@ -65,7 +67,14 @@ def _parents(path: Path, node: Array, parent: Array) -> tuple[NDArray[np.int64],
         got = f"node {node[lost][0]:g} with the parent {parent[lost][0]:g}, which is none of the nodes"
         raise refused(path, got, "a node's number, or -1 for a root", "export the whole tree again")
     order = np.argsort(node)
-    return np.flatnonzero(held), order[np.searchsorted(node, parent[held], sorter=order)]
+    child, of = np.flatnonzero(held), order[np.searchsorted(node, parent[held], sorter=order)]
+    edges = coo_array((np.ones(len(child)), (child, of)), shape=(len(node), len(node)))
+    count, piece = connected_components(edges, directed=False)
+    rings = np.setdiff1d(np.arange(count), piece[~held])
+    if len(rings):  # a root in each piece makes a forest of it
+        got = f"node {node[piece == rings[0]].min():g} among its own ancestors"
+        raise refused(path, got, "a tree with a root, whose parent is -1", "export the tree again")
+    return child, of
 
 
 def read_markups_branches(path: Path) -> Branches:
@@ -113,8 +122,9 @@ def _centreline(shapes: Shapes, path: Path) -> Branches:
 
 SHORTEST_MM = 2.0
 """No vessel that a wire is pushed through is shorter: a file of this size is in metres."""
-COARSEST_MM, MOST_FEET, MOST_WORK = 1.5, 2e7, 5e9
-"""Coarsest voxel of the lattice that a lumen is put on; most points on the wall and visits to voxels."""
+COARSEST_MM, MOST_FEET, MOST_WORK, MOST_INSIDE = 1.5, 2e7, 5e9, 6e6
+"""Coarsest voxel of the lattice that a lumen is put on; most points on the wall, visits to voxels and voxels inside: an
+aorta has 3 million; of a vessel of 50 mm radius branches took more than 14 GB to be found."""
 
 
 def _in_bounds(path: Path, found: Branches | Shapes) -> Branches | Shapes:
@@ -133,13 +143,23 @@ def _in_bounds(path: Path, found: Branches | Shapes) -> Branches | Shapes:
         a, b, c = (found.points_mm[found.triangles[:, k]] for k in range(3))
         area = 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
         amount, most = 8 * area / voxel**2 + 8 * len(found.triangles), MOST_FEET
+        inside = abs(float(np.sum(a * np.cross(b, c)))) / 6.0
     else:
         thick = np.maximum(found.start_radius_mm, found.end_radius_mm) + 3.0
         box = np.abs(found.end_mm - found.start_mm) + 2 * thick[:, None]
         amount, most = float(np.prod(box / voxel, axis=1).sum()), MOST_WORK
+        r, q = found.start_radius_mm, found.end_radius_mm
+        length = np.linalg.norm(found.end_mm - found.start_mm, axis=1)
+        inside = float(np.sum(np.pi / 3.0 * length * (r * r + r * q + q * q)))
     if amount > most:
         got = f"a wall {amount / most:.1f} times as large as can be put on a lattice"
         raise refused(path, got, "one vessel", "remove what covers itself, or make it coarser")
+    if inside > MOST_INSIDE * voxel**3:
+        got, allowed = (
+            f"a lumen of {inside / 1000:.0f} ml",
+            f"{MOST_INSIDE * voxel**3 / 1000:.0f} ml in a box of its size",
+        )
+        raise refused(path, got, allowed, "is it in another unit than mm, or are its radii diameters? Else cut it")
     return found
 
 

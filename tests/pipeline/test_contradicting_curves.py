@@ -211,6 +211,8 @@ def test_a_truth_is_of_numbers_and_stands_once(tmp_path: Path, text: str, said: 
         ("a.swc", "1 1 0 0 0 1 -1\n2 1 0 0 1_0 1 1\n", "a line that is not seven numbers"),
         ("a.swc", "1 1 0 0 0 1 -1\n2 1 0 0 3 1 1\n2 1 0 0 6 1 2\n", "got node 2 twice"),
         ("a.swc", "1 1 0 0 0 1 -1\n2 1 0 0 3 1 1\n3 1 0 0 6 1 99\n", "the parent 99, which is none of the nodes"),
+        ("a.swc", "1 1 0 0 0 1 -1\n2 1 0 0 3 1 1\n3 1 0 0 6 1 3\n", "node 3 among its own ancestors"),
+        ("a.swc", "1 1 0 0 0 1 3\n2 1 0 0 3 1 1\n3 1 0 0 6 1 2\n", "node 1 among its own ancestors"),
         ("a.swc", "1 1 0 0 0 1 -1\n2 1 0 0 3 1 1\n3 1 0 0 6 1 1.9\n", "the parent 1.9, which is none"),
         ("a.stl", "solid\nvertex 0 0 0\nvertex 1_0 0 0\nvertex 0 1 0\n", "a vertex that is not three numbers"),
         ("a.mrk.json", "[1, true]", "contradicts its format"),
