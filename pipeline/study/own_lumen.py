@@ -16,6 +16,8 @@ from pipeline.simulate.others import readings
 from pipeline.study.manifest import Case
 from solver.grid import Grid
 
+WHOLE = 1e-6
+"""How far from a whole number a voxel's may be, as written."""
 NEAR_MM = 20.0
 """An entry further than this from the box of the own lumen was not meant for it."""
 MOST_VOXELS = 400**3
@@ -113,12 +115,13 @@ def fitting(point_mm: ArrayLike, within: Callable[[Array], bool], scan: Grid | N
     """What a point that lies outside would be within as; empty where nothing simple helps.
 
     At most two changes, as of axes and unit, explain anything; and divided by 1000 all points are one. scan : whose
-    voxels its numbers may be.
+    voxels its numbers may be, where they are whole: with an origin near 0 any point in mm lies in the scan as those.
     """
     point = np.asarray(point_mm, float)[None]
     ways = [(name, p[0]) for name, p in readings(point, "mm") if name.count(" and ") < 2 and "µm" not in name]
     ways.sort(key=lambda way: way[0] != "RAS")
-    if scan is not None and np.all((point >= 0.0) & (point <= np.array(scan.shape) - 1.0)):
+    whole = np.all(np.abs(point - np.rint(point)) < WHOLE)
+    if scan is not None and whole and np.all((point >= 0.0) & (point <= np.array(scan.shape) - 1.0)):
         ways.append(("in voxels", scan.to_mm(point)[0]))
     fits = ((name, p) for name, p in ways if within(p))
     name, p = next(fits, ("", point[0]))

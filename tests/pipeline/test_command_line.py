@@ -14,6 +14,7 @@ import tomllib
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 import SimpleITK as sitk
@@ -25,8 +26,10 @@ from pipeline.run.guards import guard_apart
 from pipeline.status import UsageError
 from pipeline.streams import Lasting
 from pipeline.study.explain import described
+from pipeline.study.own_lumen import fitting
 from pipeline.study.settings import Config, SettingsError, parse_assignment, read_settings, resolve
 from pipeline.wording import in_words
+from solver import Grid
 
 
 @pytest.fixture(scope="module")
@@ -580,6 +583,15 @@ def test_what_would_put_an_entry_into_the_lumen_is_told(
     (tmp_path / "manifest.toml").write_text(text.replace("tube.swc", "tubes.swc"), encoding="utf-8")
     assert main(["check", str(tmp_path)]) == 2
     assert "tubes.swc: no such file or folder; did you mean 'tube.swc'?" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("entry", "told"), [([9.0, 70.0, 20.0], "is it in voxels? Read so"), ([9.0, 70.5, 20.0], "")])
+def test_an_entry_of_whole_numbers_alone_may_be_in_voxels(entry: list[float], told: str) -> None:
+    """In a scan of 60 mm from 0 on, in voxels of 0.3 mm, any other wrong entry was told to be in voxels, too."""
+    scan = Grid(np.zeros((200, 200, 200), np.int8), np.full(3, 0.3), np.zeros(3))
+    said = fitting(entry, lambda point: bool(np.all((point >= 0.0) & (point <= 60.0))), scan)
+    assert said.startswith(told)
+    assert bool(said) == bool(told)
 
 
 def test_bad_cases_are_left_out_and_named_where_that_is_asked_for(

@@ -3,18 +3,27 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
+import SimpleITK as sitk
 from scipy.spatial import cKDTree
 from scipy.special import ndtr
 
+from pipeline.arrays.grids import corners_mm
+from pipeline.load import Crop, read_header
 from pipeline.model import Lumen, Volume
+from pipeline.run.log import Log
 from pipeline.run.stages.known import Frame
+from pipeline.run.stages.segment import _held_against
 from pipeline.run.stages.trace import _first_said
 from pipeline.segment.astray import Entry, astray
 from pipeline.segment.shown import LumenDoubt, beside_the_wall
-from pipeline.status import FrameStatus
+from pipeline.status import FrameStatus, StageError
+from pipeline.study.settings import Config
 from reports.doubts import Caveats
 from solver import Grid
 from tests.pipeline.phantoms import helix
@@ -133,6 +142,31 @@ def test_a_lumen_that_leaves_the_vessel_beyond_the_entry_is_told(
     assert told.startswith("the given lumen lies beside the vessel: ")
     assert Caveats(warnings=[told]).against, "pages name it first"
     assert told.endswith(f"with its coordinates as {fits} it lies in the vessel" if fits else "whether it is turned")
+
+
+def test_what_cannot_be_read_beyond_the_lumen_hides_no_doubt_of_it(tube: Grid, tmp_path: Path) -> None:
+    """A scan of real numbers with NaN in its padding: other axes of the lumen lead there, what is told does not."""
+    path, lumen = tmp_path / "scan.mha", turned_about_entry(tube, np.diag([-1.0, -1.0, 1.0]))
+    noise = 100.0 + NOISE * np.random.default_rng(6).normal(size=np.array(tube.shape) + 40)
+    noise[20:-20, 20:-20, 20:-20] = scan_of(tube).values
+    image = sitk.GetImageFromArray(noise.astype(np.float32).transpose(2, 1, 0))
+    image.SetSpacing(tube.spacing_mm.tolist())
+    image.SetOrigin(tube.to_mm([-20.0] * 3).tolist())
+    image.SetDirection(tube.direction.ravel().tolist())
+    sitk.WriteImage(image, str(path))
+    box = tuple(map(slice, *read_header(path).box_of(corners_mm(lumen.distance))))
+    padded = np.full(noise.shape, np.nan, np.float32)
+    padded[box] = noise[box]
+    padding = sitk.GetImageFromArray(padded.transpose(2, 1, 0))
+    padding.CopyInformation(image)
+    sitk.WriteImage(padding, str(path))
+    scan = read_header(path)
+    with pytest.raises(StageError, match="NaN"):
+        Crop(scan, scan.box).load()
+    case = SimpleNamespace(entry_mm=ENTRY, entry_direction=AHEAD)
+    run: Any = SimpleNamespace(case=case, config=Config(), log=Log(lambda *_: None), load=lambda crop: crop.load())
+    known: Any = SimpleNamespace(scans=SimpleNamespace(first=scan))
+    assert _held_against(run, known, lumen).told.startswith("the given lumen lies beside the vessel: ")
 
 
 def test_a_lumen_that_goes_with_the_vessel_is_not_told(tube: Grid) -> None:

@@ -47,9 +47,10 @@ def own_gaps(frames: Sequence[Frame], voxel_mm: float) -> tuple[list[Frame], lis
     agreed = with_tip | stays
     for n in np.flatnonzero(agreed):
         out[with_gap[n]] = out[with_gap[n]].cleared(curves[n].without(BEYOND_GAP))
-    out = [_past_marks(frame, frames, voxel_mm) for frame in _left_behind(_faced(out, voxel_mm), voxel_mm)]
+    out, touching = _left_behind(_faced(out, voxel_mm), voxel_mm)
+    out = [_past_marks(frame, frames, voxel_mm) for frame in out]
     odd = [f"{out[with_gap[n]].index} ({beyond[n]:.1f} mm)" for n in np.flatnonzero(~agreed) if out[with_gap[n]].ok]
-    said = _pushed_along([out[with_gap[n]] for n in np.flatnonzero(with_tip & ~stays)])
+    said = touching + _pushed_along([out[with_gap[n]] for n in np.flatnonzero(with_tip & ~stays)])
     if not odd:
         return out, said
     return out, [
@@ -78,15 +79,17 @@ def _pushed_along(frames: Sequence[Frame]) -> list[str]:
     ]
 
 
-def _left_behind(frames: list[Frame], voxel_mm: float) -> list[Frame]:
+def _left_behind(frames: list[Frame], voxel_mm: float) -> tuple[list[Frame], list[str]]:
     """The frames; those fail that end at one point, and in one line, of which the wire before the gap came nearer.
+
+    And a warning of frames that end there, too, and are ok: the wire may have come up to what lies there.
 
     A wire that is pushed or drawn takes its end along; what stays has broken off, or is another device. Frames of 9, 12
     and 15 mm of wire ended at 29 mm, where a second wire began at 17 mm, and were ok.
     """
     seen = {n: f.trusted_curve for n, f in enumerate(frames) if np.isnan(f.expected_mm)}
     curves = {n: curve for n, curve in seen.items() if curve is not None}
-    out = list(frames)
+    out, ends_there = list(frames), set[int]()
     for n, curve in curves.items():
         end, lies = curve.points_mm[-1], curve.levels.get(BEYOND_GAP, np.nan)
         there = [m for m, c in curves.items() if np.linalg.norm(c.points_mm[-1] - end) < STAYED_VOXELS * voxel_mm]
@@ -105,7 +108,19 @@ def _left_behind(frames: list[Frame], voxel_mm: float) -> list[Frame]:
                 "device: look at the picture, or state insertion_mm"
             )
             out[n] = frames[n].failed("trace", FrameStatus.TRACE_AMBIGUOUS, note)
-    return out
+            ends_there |= {*there}
+    return out, _touching([out[m] for m in sorted(ends_there)])
+
+
+def _touching(frames: Sequence[Frame]) -> list[str]:
+    """A warning of those frames that are ok though they end where others are refused for a line that stays."""
+    stays, untold = ([str(f.index) for f in frames if f.ok is ok] for ok in (False, True))
+    if not untold:
+        return []
+    return [
+        f"{frames_named(untold)}: the traced wire ends where a line stays where it is in {frames_named(stays)}; how "
+        "much of it is that line does not show: look at the picture, or state insertion_mm"
+    ]
 
 
 def _faced(frames: list[Frame], voxel_mm: float) -> list[Frame]:
