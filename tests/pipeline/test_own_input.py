@@ -280,7 +280,7 @@ def test_a_surface_of_thousands_of_shells_is_refused(tmp_path):
 def test_a_lumen_that_fills_its_box_is_refused(tmp_path):
     """A radius of 50 mm: finding its branches took more than 14 GB."""
     (tmp_path / "a.swc").write_text("1 1 0 0 0 50 -1\n2 1 0 0 90 50 1\n", encoding="utf-8")
-    with pytest.raises(LoadError, match="a lumen of 707 ml; expected .* are its radii diameters"):
+    with pytest.raises(LoadError, match=r"a lumen of 707 ml; expected .* are its radii diameters"):
         lumen_in(tmp_path / "a.swc")
 
 
