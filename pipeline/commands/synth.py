@@ -7,8 +7,8 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING
 
-from pipeline.commands import add_quiet, complain, say
-from pipeline.status import did_you_mean
+from pipeline.commands import add_quiet, say
+from pipeline.status import UsageError, did_you_mean
 from reports.atomic import WriteError
 from reports.texts import size_of, status_of
 
@@ -132,11 +132,11 @@ def main(args: Namespace) -> int:
         return 0
     problems = _problems(args)
     if problems:
-        return complain(problems, "the command line")
+        raise UsageError(problems)
     try:
         return _one(args) if args.insertions == 1 else _several(args)
     except MemoryError:
-        return complain(["the scans do not fit into memory; give a smaller --size"], "the command line")
+        raise UsageError(["the scans do not fit into memory; give a smaller --size"]) from None
 
 
 def _one(args: Namespace) -> int:
@@ -153,13 +153,13 @@ def _one(args: Namespace) -> int:
         problems = problems or in_the_way(args.out, args.format, args.frames or scene.frames, fresh=args.fresh)
         problems = problems or edited(args.out) * (not args.fresh)
         if problems:
-            return complain(problems, "the command line")
+            raise UsageError(problems)
         if args.background is not None:
             say(f"{scene.name}: {scene.why}{_thick(scene)}")
         chat("the true wire is computed: seconds to minutes")
         study = catalogue.build(scene, scanner=args.scanner, **numbers)
     except (ValueError, ImportError) as error:
-        return complain([str(error)], "the command line")
+        raise UsageError([str(error)]) from None
     quality = study.quality
     chat(
         f"truth: largest force residual {quality['largest_residual_N']:.1e} N; halving its resolution moves it by "
@@ -192,7 +192,7 @@ def _several(args: Namespace) -> int:
     except ValueError as error:
         problems = [str(error)]
     if problems:
-        return complain(problems, "the command line")
+        raise UsageError(problems)
     shares = [range(first, args.insertions, args.jobs) for first in range(min(args.jobs, args.insertions))]
     done = shared(lambda number, _: _share(args, shares[number]), len(shares), len(shares))
     parts = {number: text for part in done for number, text in part.items()}

@@ -183,7 +183,7 @@ def _carried_out(verb: str, manifest: Place, settings: object = None, **options:
         if isinstance(wanted, Mapping):
             flat = {f"{key}.{name}": value for name, value in wanted.items()}
             raise InputError([f"settings: write {json.dumps(flat, default=str)}"])
-        words += ["--set", f"{key}={json.dumps(wanted)}"]
+        words += ["--set", f"{key}={json.dumps(wanted, default=_plain)}"]
     for name, value in options.items():
         for one in value if isinstance(value, (list, tuple)) else [value]:
             if one is not None and one is not False:
@@ -192,6 +192,11 @@ def _carried_out(verb: str, manifest: Place, settings: object = None, **options:
         code = carried_out(parsed(words))
     if code == BAD_INPUT:
         raise InputError([f"wireval {verb}: nothing was run; the problems stand above"])
+
+
+def _plain(value: object) -> object:
+    """A number or array of numpy's as Python's own."""
+    return value.tolist() if hasattr(value, "tolist") else str(value)
 
 
 @contextmanager

@@ -249,3 +249,14 @@ def test_a_gate_that_any_simulator_closes_is_told(tmp_path: Path) -> None:
     assert main(["report", str(tmp_path / "scored"), "--overview"]) == 1
     assert set(scored.simulators["simulator"]) == {"near", "far", "wireval"}
     assert len(scored.where)
+
+
+def test_what_synth_cannot_do_is_in_its_error(tmp_path: Path) -> None:
+    """It was "the problems stand above", which a notebook does not show."""
+    with pytest.raises(wireval.InputError, match="frames: got 0; allowed: 1 or more"):
+        wireval.synth("bend", tmp_path / "study", frames=0)
+
+
+def test_settings_may_be_numbers_of_numpy(tmp_path: Path) -> None:
+    with pytest.raises(wireval.InputError, match="budget.members"):
+        wireval.run(tmp_path, tmp_path / "out", settings={"budget.members": np.int64(-1)})
