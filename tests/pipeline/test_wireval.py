@@ -258,5 +258,5 @@ def test_what_synth_cannot_do_is_in_its_error(tmp_path: Path) -> None:
 
 
 def test_settings_may_be_numbers_of_numpy(tmp_path: Path) -> None:
-    with pytest.raises(wireval.InputError, match="budget.members"):
+    with pytest.raises(wireval.InputError, match=r"budget\.members"):
         wireval.run(tmp_path, tmp_path / "out", settings={"budget.members": np.int64(-1)})
