@@ -260,6 +260,6 @@ def standing(frames: Sequence[Frame], voxel_mm: float) -> list[str]:
     if len(seen) < FEWEST - 1 or len(rolls) > 1 or np.ptp(lengths) > LEAST_VOXELS * voxel_mm:
         return []
     return [
-        f"the traced wire is {np.median(lengths):.1f} mm long in all {len(seen)} frames whose traces are trusted: it did not "
-        "advance, or entry_mm lies inside it, or entry_direction points the way that it came from; look at the picture"
+        f"the traced wire is {np.median(lengths):.1f} mm long in all {len(seen)} frames whose traces are trusted: it "
+        "did not advance, or entry_mm lies inside it, or entry_direction points the way that it came from; look at the picture"
     ]
