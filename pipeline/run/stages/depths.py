@@ -261,5 +261,6 @@ def standing(frames: Sequence[Frame], voxel_mm: float) -> list[str]:
         return []
     return [
         f"the traced wire is {np.median(lengths):.1f} mm long in all {len(seen)} frames whose traces are trusted: it "
-        "did not advance, or entry_mm lies inside it, or entry_direction points the way that it came from; look at the picture"
+        "did not advance, or entry_mm lies inside it, or entry_direction points the way that it came from; look at "
+        "the picture"
     ]
