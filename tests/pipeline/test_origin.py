@@ -82,7 +82,7 @@ def test_the_wires_of_another_simulator_are_one_input(study: Path, tmp_path: Pat
     role = {"role": "calibration"}
     path.write_text(json.dumps(result | role | {"summary": result["summary"] | role}), encoding="utf-8")
     rows = what_differs(tmp_path / "before", tmp_path / "after")
-    assert [(row["what"], row["after"]) for row in rows] == [("manifest of a: role", "calibration")]
+    assert [(row["what"], row["after"]) for row in rows] == [("manifest of a: [[case]] role", "calibration")]
 
 
 def test_a_simulator_that_wrote_nothing_for_one_case_is_still_the_same(study: Path, tmp_path: Path) -> None:
