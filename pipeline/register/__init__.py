@@ -19,7 +19,7 @@ from pipeline.register.points import static_points
 from pipeline.register.reference import WALL_POINTS, Anchor, anchor
 from pipeline.register.rigid import Motion
 from pipeline.register.search import BAD_MISFIT_VOXELS, shaded_best
-from pipeline.register.shift import MOST_METAL, Fit, Solved, farthest, fit_motion, glance, look
+from pipeline.register.shift import MOST_METAL, Fit, Solved, farthest, fit_motion, look
 from pipeline.register.slide import slid
 from pipeline.register.wider import Wider, wider
 
@@ -143,7 +143,7 @@ def register(frame: Volume, to: Anchor, skip_voxels: float) -> Registration:
     wall, frame = to.wall, unpadded(frame, padding_in(frame))
     if len(wall.points_mm) < WALL_POINTS:
         return Registration(misfit_voxels=float("inf"))
-    first = glance(frame, wall, Motion())
+    first = fit_motion(frame, wall.in_one, rounds=1)
     moved = farthest(first.motion, wall)
     if moved < skip_voxels and first.misfit_voxels < BAD_MISFIT_VOXELS:
         return _still(frame, to, first, moved)
@@ -158,12 +158,13 @@ def register(frame: Volume, to: Anchor, skip_voxels: float) -> Registration:
     if last.misfit_voxels > BAD_MISFIT_VOXELS:
         noise = wall.noise_voxels(static_points(frame, wall.points_mm, to.patch_mm).noise)
         return Registration(moved_voxels=moved, left_voxels=left, misfit_voxels=last.misfit_voxels, noise_voxels=noise)
-    still, far = look(frame, wall, Motion())[0], farthest(motion, wall)
-    near = farthest(still.motion, wall)
+    far = farthest(motion, wall)
     # only grey that is shaded otherwise looks like a motion: slopes explain those of a straight tube, too
-    at_rest = shading != "one" and near < skip_voxels and still.misfit_voxels < AS_WELL * last.misfit_voxels
-    if at_rest or far < skip_voxels:
-        return _still(frame, to, still, min(far, near))
+    if far < skip_voxels or shading != "one":
+        still, _ = look(frame, wall, Motion())
+        near = farthest(still.motion, wall)
+        if far < skip_voxels or (near < skip_voxels and still.misfit_voxels < AS_WELL * last.misfit_voxels):
+            return _still(frame, to, still, min(far, near))
     shift, loose_mm = motion.displacement_mm(wall.centre_mm), loose * wall.voxel_mm
     found = Registration(motion, True, far, left, last.misfit_voxels, shift, loose_mm)
     return _with_rest(found, frame, to, last.last, taken=False)

@@ -11,10 +11,10 @@ from typing import NamedTuple
 import numpy as np
 
 from pipeline.model import Curve, Volume
-from pipeline.register import Anchor, Motion, register
+from pipeline.register import Anchor, register
 from pipeline.register.reference import WALL_POINTS
 from pipeline.register.search import BAD_MISFIT_VOXELS
-from pipeline.register.shift import Fit, farthest, fit_motion, glance, look
+from pipeline.register.shift import Fit, farthest, fit_motion, look
 from reports.case_files import frames_named
 
 DRIFT = "drift_voxels"
@@ -73,11 +73,12 @@ def _moved_voxels(frame: Volume, structures: Anchor, *, doubted: bool) -> float:
 
     doubted : it is looked for far and wide, which takes a second, where it is not found near.
     """
-    moved = _seen_near(glance(frame, structures.wall, Motion()), structures)
+    wall = structures.wall
+    moved = _seen_near(fit_motion(frame, wall.in_one, rounds=1), structures)
     if not moved < MOVED_VOXELS:
-        near = fit_motion(frame, structures.wall.in_one).motion
-        shading = look(frame, structures.wall, near)[1]
-        moved = _seen_near(fit_motion(frame, structures.wall.shaded(shading)), structures)
+        near = fit_motion(frame, wall.in_one)
+        shading = look(frame, wall, near.motion)[1]
+        moved = _seen_near(near if shading == "one" else fit_motion(frame, wall.shaded(shading)), structures)
     if not doubted or moved < MOVED_VOXELS:
         return moved
     found = register(frame, structures, MOVED_VOXELS)

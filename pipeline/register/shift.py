@@ -148,11 +148,6 @@ def _step(s: StaticPoints, at_mm: Array, grey: Array, motion: Motion) -> Fit:
     return Fit(moved_by(motion, s, found.amounts), misfit, found._replace(clear=clear))
 
 
-def glance(frame: Volume, s: StaticPoints, motion: Motion) -> Fit:
-    """One step from ``motion`` on, with one gain of grey."""
-    return _steps(frame, s, motion, [s.in_one])[0]
-
-
 def look(frame: Volume, s: StaticPoints, motion: Motion) -> tuple[Fit, Shading]:
     """One step from ``motion`` on, and with which shading: the simplest that explains the frame.
 

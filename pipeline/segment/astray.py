@@ -15,14 +15,13 @@ from scipy import ndimage
 
 from pipeline.arrays.grids import indices_of, sampled, spelt, spread
 from pipeline.model import Array, Lumen, Volume
+from pipeline.segment.shown import LEAST_NOISES
 
 POINTS = 4000
 LEAST_NEAR = 10
 """Fewer points deep in the lumen at the entry, or voxels around them, tell no grey."""
 DEEP_VOXELS, AROUND_VOXELS = 1.0, (2.0, 4.0)
 """How deep points lie, and how far outside the wall the grey around is taken."""
-LEAST_NOISES = 2.0
-"""Contrast over a voxel's noise below which a scan is not asked."""
 ASTRAY = 0.2
 """Share of a lumen's inside without the vessel's grey from which it is looked where the vessel goes. In the catalogue's
 scenes 0.3 to 1 of lumens flipped or swapped about the entry; of right ones 0, but of branches three voxels across 0.3.
@@ -46,16 +45,12 @@ class Greys(NamedTuple):
         return np.asarray(np.abs(grey - self.vessel) < 0.5 * abs(self.vessel - self.around))
 
 
-class Entry(NamedTuple):
-    """Where the wire goes in (3,), LPS mm, and its direction (3,) there."""
+def astray(lumen: Lumen, scan: Volume, entry_mm: Array, direction: Array, wider: Callable[[Array], Volume]) -> str:
+    """A sentence where a lumen leaves the vessel that a scan shows. wider : the scan around points (n, 3), LPS mm.
 
-    at_mm: Array
-    direction: Array
-
-
-def astray(lumen: Lumen, scan: Volume, entry: Entry, wider: Callable[[Array], Volume]) -> str:
-    """A sentence where a lumen leaves the vessel that a scan shows. wider : the scan around points (n, 3), LPS mm."""
-    voxel, entry_mm = float(np.max(scan.spacing_mm)), entry.at_mm
+    entry_mm, direction : where the wire goes in (3,), LPS mm, and how (3,).
+    """
+    voxel = float(np.max(scan.spacing_mm))
     points, depth = _deep(lumen, DEEP_VOXELS * voxel)
     away = np.linalg.norm(points - entry_mm, axis=1)
     if len(points) < LEAST_NEAR:
@@ -67,7 +62,7 @@ def astray(lumen: Lumen, scan: Volume, entry: Entry, wider: Callable[[Array], Vo
         return ""
     seen = _within(scan, points)
     share = 1.0 - float(np.mean(greys.like_vessel(_mean_around(scan, points[seen])))) if seen.any() else 0.0
-    beyond = _beyond(scan, entry, greys) if share >= ASTRAY else None
+    beyond = _beyond(scan, entry_mm, direction, greys) if share >= ASTRAY else None
     place = None if beyond is None else _left_at(lumen, scan, near, radius, beyond)
     if place is None:
         return ""
@@ -115,15 +110,12 @@ def _greys(lumen: Lumen, scan: Volume, near_mm: Array, radius_mm: float) -> Grey
     return found if abs(found.vessel - found.around) > LEAST_NOISES * noise else None
 
 
-def _beyond(scan: Volume, entry: Entry, greys: Greys) -> NDArray[np.bool_]:
+def _beyond(scan: Volume, entry_mm: Array, direction: Array, greys: Greys) -> NDArray[np.bool_]:
     """Voxels with the vessel's grey beyond the entry: the inlet before it is no way out of the lumen."""
     # noise would lead from voxel to voxel through what is around
     smooth = ndimage.gaussian_filter(scan.values, BLUR_VOXELS, output=np.float32)
-    x, y, z = np.ogrid[tuple(map(slice, scan.shape))]
-    steps = scan.to_mm(np.eye(3)) - scan.origin_mm
-    along = (scan.origin_mm - entry.at_mm) @ entry.direction
-    for index, step in zip((x, y, z), steps @ entry.direction, strict=True):
-        along = along + index * step
+    first, steps = (scan.origin_mm - entry_mm) @ direction, (scan.to_mm(np.eye(3)) - scan.origin_mm) @ direction
+    along = first + sum(step * index for step, index in zip(steps, np.indices(scan.shape, sparse=True), strict=True))
     return np.asarray(greys.like_vessel(smooth) & (along > 0.0))
 
 

@@ -6,13 +6,13 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from pipeline.load import Header, LoadError, Scans, Source, each_volume, read_header, require_one, require_whole
 from pipeline.load.curves import read_curve, read_truth
 from pipeline.load.guard import is_folder, status_of
 from pipeline.load.views import read_views
 from pipeline.load.wires import read_wires
-from pipeline.model import Array
 from pipeline.simulate.others import oddity
 from pipeline.status import nearest
 from pipeline.study.case_rules import not_one_per_frame
@@ -164,7 +164,7 @@ def entry_problems(case: Case, scans: Scans) -> list[str]:
         return []
     problems, middle, grid = [], 0.5 * (np.array(header.shape) - 1.0), header.grid
 
-    def held(place: Array) -> bool:
+    def held(place: ArrayLike) -> bool:
         return bool(np.all(np.abs(grid.to_index(place) - middle) <= middle + 0.5))
 
     seeds = [point for point in case.lumen_seed_mm if point != case.entry_mm]
@@ -173,9 +173,9 @@ def entry_problems(case: Case, scans: Scans) -> list[str]:
             continue
         index = grid.to_index(points)
         for point, voxel in zip(points, index, strict=True):
-            if np.any(voxel < -0.5) or np.any(voxel > np.array(header.shape) - 0.5):
-                fits = fitting(point, held, header.grid)
-                corners = header.grid.to_mm([[0, 0, 0], [n - 1 for n in header.shape]]).round(1).tolist()
+            if not held(point):
+                fits = fitting(point, held, grid)
+                corners = grid.to_mm([[0, 0, 0], [n - 1 for n in header.shape]]).round(1).tolist()
                 problems.append(
                     f"{name} {list(point)} lies outside the scan (voxel {voxel.round(1).tolist()} of "
                     f"{list(header.shape)}); the scan spans {corners[0]} to {corners[1]} mm in LPS; "

@@ -20,7 +20,7 @@ from pipeline.run.log import Log
 from pipeline.run.stages.known import Frame
 from pipeline.run.stages.segment import _held_against
 from pipeline.run.stages.trace import _first_said
-from pipeline.segment.astray import Entry, astray
+from pipeline.segment.astray import astray
 from pipeline.segment.shown import LumenDoubt, beside_the_wall
 from pipeline.status import FrameStatus, StageError
 from pipeline.study.settings import Config
@@ -63,7 +63,7 @@ def turned_about_entry(tube: Grid, turn: object) -> Lumen:
 
 
 def told_astray(lumen: Lumen, scan: Volume) -> str:
-    return astray(lumen, scan, Entry(ENTRY, AHEAD), lambda _: scan)
+    return astray(lumen, scan, ENTRY, AHEAD, lambda _: scan)
 
 
 def larger(tube: Grid, by_mm: float) -> Lumen:

@@ -93,11 +93,10 @@ def _left_behind(frames: list[Frame], voxel_mm: float) -> tuple[list[Frame], lis
     for n, curve in curves.items():
         end, lies = curve.points_mm[-1], curve.levels.get(BEYOND_GAP, np.nan)
         there = [m for m, c in curves.items() if np.linalg.norm(c.points_mm[-1] - end) < STAYED_VOXELS * voxel_mm]
-        levels = [(curves[m].length_mm, curves[m].levels) for m in there if BEYOND_GAP in curves[m].levels]
         before = [
-            long - of[BEYOND_GAP] - of[GAP]
-            for long, of in levels
-            if abs(of[BEYOND_GAP] - lies) < AGREE_VOXELS * voxel_mm
+            c.length_mm - c.levels[BEYOND_GAP] - c.levels[GAP]
+            for c in (curves[m] for m in there)
+            if abs(c.levels.get(BEYOND_GAP, np.nan) - lies) < AGREE_VOXELS * voxel_mm
         ]
         if len(there) >= FEWEST and before and np.ptp(before) > CAME_NEARER_MM:
             note = (

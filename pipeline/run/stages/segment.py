@@ -15,7 +15,7 @@ from pipeline.model import Array, Lumen, Volume
 from pipeline.run.projections import slabs
 from pipeline.run.stages.known import Context, Known
 from pipeline.segment import segment
-from pipeline.segment.astray import Entry, astray
+from pipeline.segment.astray import astray
 from pipeline.segment.given import given_lumen
 from pipeline.segment.hollows import hollows
 from pipeline.segment.levels import failed
@@ -122,7 +122,7 @@ def _held_against(run: Context, known: Known, lumen: Lumen) -> LumenDoubt:
             return shown
 
     with run.log.timed("segment"):
-        told = astray(lumen, shown, Entry(np.array(run.case.entry_mm), np.array(run.case.entry_direction)), wider)
+        told = astray(lumen, shown, np.array(run.case.entry_mm), np.array(run.case.entry_direction), wider)
         return LumenDoubt(told, far=True) if told else beside_the_wall(lumen, shown)
 
 
