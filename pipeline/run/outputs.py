@@ -79,7 +79,7 @@ def error_row(frame: Frame, clamp: Clamp | None = None) -> dict[str, Any]:
         null = frame.nulls_rms_mm.get("centreline", float("nan"))
         row["skill"] = skill_of(float(frame.comparison["rms_mm"]), null)
     if frame.curve is not None and len(frame.curve.sigma_mm):
-        row["trace_sigma_mm"] = rms(frame.curve.sigma_mm)
+        row |= {"trace_sigma_mm": rms(frame.curve.sigma_mm), "tip_sigma_mm": frame.curve.tip_sigma_mm}
     if frame.simulated is not None:
         row["joints"] = len(frame.simulated.joints_mm)
     wire = frame.simulated_wire

@@ -125,6 +125,7 @@ def _row(case: FakeCase, frame: int, depth: float, rng: np.random.Generator) -> 
         "skill": 1 - (rms / null) ** 2,
         "coverage": 1.0,
         "trace_sigma_mm": 0.02 * rng.uniform(0.8, 1.2),
+        "tip_sigma_mm": 0.06 * rng.uniform(0.8, 1.2),
         "max_penetration_mm": 0.05 + 0.01 * rng.random(),
         "push_force_N": 0.02 + 0.004 * frame**1.2 * rng.uniform(0.9, 1.1),
         "joints": int(depth) + 1,

@@ -23,7 +23,7 @@ ERRORS_HEADER = (
     "hausdorff_mm,arc_rms_mm,arc_max_mm,tip_mm,tip_angle_deg,tip_along_mm,tip_across_mm,depth_offset_mm,side_ok,"
     "branch_ok,null_centreline_rms_mm,null_shortest_rms_mm,null_min_bending_rms_mm,null_previous_rms_mm,"
     "null_roll_unknown_rms_mm,null_no_tip_curve_rms_mm,null_pinned_rms_mm,null_neighbours_rms_mm,skill,"
-    "skill_strongest,strongest_null,coverage,trace_sigma_mm,max_penetration_mm,push_force_N,num_push_N,joints,"
+    "skill_strongest,strongest_null,coverage,trace_sigma_mm,tip_sigma_mm,max_penetration_mm,push_force_N,num_push_N,joints,"
     "iterations,num_mm,snaps,uncertain,least_pivot,u_input_mm,u_val_mm,share_beyond_2u,release,release_real,log_score_bits,"
     "energy_score_mm,released,released_at_mm,clamp_note,trace_mean_mm,"
     "trace_max_mm,trace_tip_mm,truth_rms_mm,truth_tip_mm"
