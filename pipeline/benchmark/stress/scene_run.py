@@ -70,8 +70,8 @@ def build(plan: ScenePlan) -> tuple[GuideWire, VesselWall | None]:
     if not plan.wall:
         return wire, None
     with warnings.catch_warnings():
-        # a lumen of a single voxel, or of none, is a scene like another
-        warnings.filterwarnings("ignore", "wall: distance: the least value")
+        # a lumen of a voxel or two, or of none, is a scene like another
+        warnings.filterwarnings("ignore", "wall: distance: ")
         return wire, VesselWall(lumen_grid(plan), plan.wall_stiffness, plan.friction, plan.hull)
 
 
