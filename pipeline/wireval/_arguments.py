@@ -3,6 +3,7 @@
 from collections.abc import Callable, Collection, Mapping
 from os import PathLike
 from pathlib import Path
+from typing import TypeGuard
 
 from pipeline.status import InputError
 from pipeline.wording import shortened
@@ -25,7 +26,7 @@ def _are_places(value: object) -> bool:
     return isinstance(value, str) or _is_place(value) or _are_words(value, (str, PathLike))
 
 
-def _is_list(value: object) -> bool:
+def _is_list(value: object) -> TypeGuard[Collection[object]]:
     return isinstance(value, Collection) and not isinstance(value, (str, bytes, Mapping))
 
 
