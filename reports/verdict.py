@@ -8,7 +8,7 @@ from typing import Any
 from reports._content import NOTHING, fewer_frames, interval, length, number, predictor_label, skill_told, value_of
 from reports.case_files import counted
 from reports.doubts import NO_CAVEATS, Caveats
-from reports.few_insertions import alone_in, of_these_alone, over_few, wide_over_few
+from reports.few_insertions import alone_in, narrow_of_short, of_these_alone, over_few, wide_over_few
 from reports.schema import OURS, SUMMARY
 from reports.tips import tips_off
 
@@ -61,6 +61,7 @@ def _sentences(
         (weaker, True),
         (of_these_alone(alone_in(statistics, *_skill(statistics)[1:])), True),
         (few, False),
+        (narrow_of_short(statistics), False),
         (_unknown_roll(statistics, simulator, caveats), True),
         (again, True),
     ]

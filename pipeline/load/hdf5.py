@@ -81,10 +81,20 @@ def _inside(group: h5py.Group, name: str, source: Source) -> Any:
     return node
 
 
+def _attribute(source: Source, data: h5py.Dataset, name: str, default: Any, allowed: str) -> Any:
+    """An attribute's value, the default where there is none; LoadError for one without a value."""
+    found = data.attrs.get(name, default)
+    if isinstance(found, h5py.Empty):
+        why = f"{data.name} has an empty attribute {name}"
+        raise unusable(source, f"{why}; allowed: {allowed}. Write its value, or take the attribute out.")
+    return found
+
+
 def _is_xyz(data: h5py.Dataset, source: Source) -> bool:
-    axes = str(data.attrs.get("axes", AXES[0]))
+    allowed = " or ".join(map(repr, AXES))
+    axes = str(_attribute(source, data, "axes", AXES[0], allowed))
     if axes not in AXES:
-        raise unusable(source, f"attribute axes is {axes!r}; allowed: {' or '.join(map(repr, AXES))}")
+        raise unusable(source, f"attribute axes is {axes!r}; allowed: {allowed}")
     return axes == AXES[1]
 
 
@@ -164,7 +174,7 @@ def require_written(what: object, data: h5py.Dataset) -> None:
 
 def _numbers(source: Source, data: h5py.Dataset, name: str, default: NDArray[Any]) -> NDArray[np.float64]:
     """An attribute of as many numbers as the default has."""
-    found = np.asarray(data.attrs.get(name, default))
+    found = np.asarray(_attribute(source, data, name, default, f"{default.size} numbers"))
     if found.dtype.kind not in "iuf" or found.size != default.size:
         got = f"{data.name} has {name} = {str(found.tolist())[:80]}"
         raise unusable(source, f"{got}; allowed: {default.size} numbers. Check that the file is complete: correct it.")

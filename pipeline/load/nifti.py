@@ -22,6 +22,8 @@ AGREE_VOXELS = 0.1
 """The two forms may lie this far apart at a corner before the header's notes say so."""
 RIGHT_ANGLES = 1e-3
 """Cosine between axes up to which a form's matrix is a rotation written with few digits, not a shear."""
+LEAST_SPAN = 0.01
+"""Volume that the unit axes of a form must span: below it the form is singular, whatever its rounding."""
 _FIRST = {
     "size": ("i4", 0), "dim": ("8i2", 40), "datatype": ("i2", 70), "bitpix": ("i2", 72), "pixdim": ("8f4", 76),
     "vox_offset": ("f4", 108),
@@ -143,6 +145,12 @@ def _geometry(path: Path, fields: Any, shape: NDArray[Any]) -> tuple[Placed, tup
             )
     if int(fields["qform"]) > 0:
         forms["qform"] = _of_quaternion(path, fields, pixdim)
+    if "sform" in forms and not _span(forms["sform"]) >= LEAST_SPAN:
+        why = "its sform is singular (the axes in srow span no volume)"
+        if "qform" not in forms:
+            raise unusable(path, f"{why}; allowed: three axes across each other; correct the header")
+        del forms["sform"]
+        notes.append(f"{path.name}: {why}: the qform is used")
     used = next((f for f in forms.values() if _is_rigid(f)), next(iter(forms.values()), None))
     if used is None:
         notes.append(
@@ -159,6 +167,12 @@ def _geometry(path: Path, fields: Any, shape: NDArray[Any]) -> tuple[Placed, tup
         notes.append(f"{path.name}: {differ}: the matrix is used")
     with np.errstate(invalid="ignore", divide="ignore"):
         return (size, matrix[:, 3], matrix[:, :3] / size), tuple(notes)
+
+
+def _span(form: NDArray[Any]) -> float:
+    """Volume that a form's axes span, as unit vectors; NaN where one has no length."""
+    with np.errstate(all="ignore"):
+        return float(abs(np.linalg.det(form[:, :3] / np.linalg.norm(form[:, :3], axis=0))))
 
 
 def _is_rigid(form: NDArray[Any]) -> bool:

@@ -22,6 +22,8 @@ BIG_ENDIAN = "1.2.840.10008.1.2.2"
 PHYSICAL = ("CT", "PT")
 """Modalities whose rescaled values have a unit: there MONOCHROME1 says how to print, not what was measured."""
 PLACE = (("ImagePositionPatient", 3), ("ImageOrientationPatient", 6), ("PixelSpacing", 2))
+UNIT = 0.01
+"""How far an orientation vector may be off the length 1: so much do two decimals explain (0.71, 0.71)."""
 DEFER = 4096
 """Longer values (the pixels) are passed over; where they lie is kept."""
 
@@ -127,6 +129,10 @@ def planes_of(path: Path, data: Any) -> list[Plane]:
 
 def _plane(path: Path, frame: int, groups: list[Any], pixels: Pixels, *, several: bool) -> Plane:
     position, orientation, spacing = (_numbers(path, groups, name, count) for name, count in PLACE)
+    lengths = np.linalg.norm(orientation.reshape(2, 3), axis=1)
+    if np.abs(lengths - 1.0).max() > UNIT:
+        why = f"ImageOrientationPatient {orientation.tolist()} has vectors of the lengths {lengths.round(3).tolist()}"
+        raise unusable(path, f"{why}; allowed: unit vectors (to {UNIT:g}). Export the series again.")
     slope, intercept = (_numbers(path, groups, name, 1, default) for name, default in RESCALE)
     rescale = float(slope[0]), float(intercept[0])
     return Plane(path, frame, position, orientation, spacing[::-1], pixels, *rescale, several)

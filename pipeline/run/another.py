@@ -15,10 +15,11 @@ from pipeline.arrays.polyline import at_arc, samples
 from pipeline.compare.config import CompareConfig
 from pipeline.compare.metrics import point_to_curve, scored
 from pipeline.compare.nulls import ANOTHER
+from pipeline.compare.pooled import Scored
 from pipeline.model import Array
 from pipeline.run.kin import SAME_ENTRY_MM, by_phantom, with_kin
 from pipeline.run.overall import Found
-from pipeline.run.stages.repeated import ALIKE, ONE_WIRE
+from pipeline.run.stages.repeated import ALIKE, ONE_WIRE, OWN_MM
 from pipeline.run.traced import Traces, compare_of, traces_of
 from reports.case_files import listed
 from reports.doubts import COUNT_AS
@@ -64,7 +65,7 @@ def copies(found: Sequence[Found]) -> list[str]:
     pairs: dict[tuple[str, ...], list[tuple[float, float]]] = {}
     for case in found:
         rows = [frame for frame in case.frames.values() if frame.guesses]
-        sigma = float(np.median([frame.row.get("trace_sigma_mm") or math.nan for frame in rows] or [math.nan]))
+        sigma = _known_to(case, rows)
         for other in sorted({name for frame in rows for name in frame.guesses}):
             squares, count = np.sum([frame.guesses[other] for frame in rows if other in frame.guesses], axis=0)
             both = tuple(sorted((case.insertion, other)))
@@ -80,6 +81,17 @@ def copies(found: Sequence[Found]) -> list[str]:
         for found_alike, what, or_else in ((written, WRITTEN, ""), (alike, RESCANNED, OR_ELSE))
         for names, apart, known_to in _together(found_alike)
     ]
+
+
+def _known_to(case: Found, rows: Sequence[Scored]) -> float:
+    """What the traces of these frames are known to, mm, median; those that were given as ``repeated`` supposes.
+
+    What is stated of them (traces_mm) may be 0, of which copies were not told, or 0.5 mm, of which two insertions were
+    told that lie 1.4 mm apart.
+    """
+    if any((frame.get("trace") or {}).get("given") for frame in case.result.frames):
+        return OWN_MM
+    return float(np.median([frame.row.get("trace_sigma_mm") or math.nan for frame in rows] or [math.nan]))
 
 
 def _stated_apart(both: tuple[str, ...], found: Sequence[Found]) -> bool:

@@ -258,7 +258,7 @@ def _write_lost(outcome: Outcome[Job, None]) -> None:
         sys.stderr.write(f"{job.case.id}: {outcome.error}; left to {owner}, which is at work on it\n")
         return
     kept = clear(job.folder)
-    stage = last_stage(log)
+    stage = last_stage(log) or "run"
     with writing(log), log.open("a", encoding="utf-8") as file:
         file.writelines(f"{said}\n" for said in (kept, outcome.log) if said)
     lost(job.case.id, outcome.status, outcome.error, job.case, stage).write(job.folder)

@@ -254,11 +254,13 @@ def _events(frame: Frame) -> dict[str, Any]:
 
 
 def _marked(frame: Frame) -> dict[str, float]:
-    """Shares of a frame's traced points that are flagged, and that run nearly in the plane of rotation."""
+    """Shares of a frame's traced points that are flagged, and that run nearly in the plane of rotation; and whether the
+    trace was given."""
     if frame.curve is None or len(frame.curve.points_mm) == 0:
         return {}
     marks = {"flagged": frame.curve.flagged, "in_plane": frame.curve.in_plane}
-    return {name: float(np.mean(np.asarray(values))) for name, values in marks.items()}
+    shares = {name: float(np.mean(np.asarray(values))) for name, values in marks.items()}
+    return shares | {"given": bool(frame.curve.source)}
 
 
 def _geometry(scan: Header | None) -> dict[str, Any]:

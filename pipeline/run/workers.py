@@ -121,9 +121,14 @@ def in_processes(
     try:
         while waiting or busy:
             while waiting and len(busy) < count:
-                busy.append(idle.pop() if idle else Worker(work))
+                try:
+                    busy.append(idle.pop() if idle else Worker(work))
+                except (EOFError, ConnectionError):  # the server was killed: another one is started for the next job
+                    yield Outcome(waiting.popleft(), None, LOST, f"{LOST} (its server was)", "worker_lost")
+                    _start_server()
+                    continue
                 busy[-1].give(waiting.popleft())
-            ready = connection.wait([worker.pipe for worker in busy], LOOK_S if limits.any else None)
+            ready = connection.wait([worker.pipe for worker in busy], LOOK_S if limits.any or not busy else None)
             for worker in tuple(busy):
                 outcome = worker.outcome(worker.pipe in ready, limits)
                 if outcome is None:

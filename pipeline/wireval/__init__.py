@@ -21,6 +21,7 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from . import _own_packages  # noqa: F401 - first: it says what is in the way of the imports below
 
@@ -32,9 +33,11 @@ from pipeline.run.provenance import package_version
 from pipeline.status import InputError, StageError
 from reports.case_files import CaseFiles
 from reports.frames_file import FrameArrays, ScanCrop
+from reports.texts import UnreadableError
 from reports.two_runs import Verdict
 from solver import Catheter, Grid, GuideWire, Insertion, Insertions, Snap, Solution, Status, VesselWall, relax
 
+from ._arguments import require
 from .results import Results, read_results, read_run, wall_of
 
 __version__ = package_version()
@@ -83,6 +86,7 @@ def synth(scene: str, out: Place, **more: bool | float | str) -> Path:
 
     more : options of ``wireval synth``, such as ``frames=8`` or ``seed=3``.
     """
+    require(scene=scene, out=out)
     _carried_out("synth", scene, out=out, **more)
     return Path(out) / "manifest.toml"
 
@@ -93,6 +97,7 @@ def check(manifest: Place, *, settings: Settings | None = None) -> list[str]:
     Only the headers of scans are read, not their voxels, unless a manifest has to be inferred from a folder of scans.
     """
     try:
+        require(manifest=manifest)
         _carried_out("check", manifest, settings=settings)
     except InputError as error:
         return list(error.problems)
@@ -123,6 +128,7 @@ def run(
     folder keeps the cases that are finished. A shard without any case writes no files, and its tables are empty.
     Raises InputError where nothing could be run.
     """
+    require(manifest=manifest, out=out, sweep=sweep or {}, fail_if=fail_if)
     points = [f"{name}={','.join(map(str, values))}" for name, values in (sweep or {}).items()]
     gates = [fail_if] if isinstance(fail_if, str) else list(fail_if)
     _carried_out("run", manifest, out=out, settings=settings, jobs=jobs, sweep=points, fail_if=gates, **more)
@@ -144,6 +150,7 @@ def score(
     more : options of ``wireval score``.
     For the results of another simulator: ``read_results(out / "simulators" / NAME)``.
     """
+    require(manifest=manifest, out=out, curves=curves, fail_if=fail_if)
     gates = [fail_if] if isinstance(fail_if, str) else list(fail_if)
     named = [f"{name}={place}" for name, place in curves.items()] if isinstance(curves, Mapping) else curves
     curves = [named] if isinstance(named, (str, Path)) else list(named)
@@ -156,6 +163,7 @@ def calibrate(manifest: Place, out: Place, **more: bool | Settings) -> Path:
 
     more : options of ``wireval calibrate``.
     """
+    require(manifest=manifest, out=out)
     _carried_out("calibrate", manifest, out=out, **more)
     return Path(out) / "parameters.toml"
 
@@ -167,6 +175,7 @@ def diff(first: Place, second: Place, *, tolerance: Place | None = None) -> Verd
     ``share`` says by which share of the first value, where that is more. By default the one installed with wireval.
     Raises InputError where the two cannot be compared.
     """
+    require(first=first, second=second, **({} if tolerance is None else {"tolerance": tolerance}))
     try:
         return compared(Path(first), Path(second), None if tolerance is None else Path(tolerance))
     except (ValueError, OSError) as error:
@@ -176,10 +185,9 @@ def diff(first: Place, second: Place, *, tolerance: Place | None = None) -> Verd
 def _carried_out(verb: str, manifest: Place, settings: object = None, **options: object) -> None:
     """The verb as typed with these options. A list repeats its option, True stands for one alone."""
     words = [verb, str(manifest)]
-    if settings is not None and not isinstance(settings, Mapping):
-        expected = 'a mapping, {"segment.threshold": 0.5}, with the keys that --set takes'
-        raise InputError([f"settings: got {settings!r}; expected {expected}"])
-    for key, wanted in (settings or {}).items():
+    chosen: Any = {} if settings is None else settings
+    require(settings=chosen)
+    for key, wanted in chosen.items():
         if isinstance(wanted, Mapping):
             flat = {f"{key}.{name}": value for name, value in wanted.items()}
             raise InputError([f"settings: write {json.dumps(flat, default=str)}"])
@@ -189,7 +197,12 @@ def _carried_out(verb: str, manifest: Place, settings: object = None, **options:
             if one is not None and one is not False:
                 words += [f"--{name.replace('_', '-')}"] + [str(one)] * (one is not True)
     with _typed(words):
-        code = carried_out(parsed(words))
+        try:
+            code = carried_out(parsed(words))
+        except UnreadableError as error:
+            raise InputError([str(error)]) from None
+        except SystemExit:
+            raise InputError([f"help, print_completion: of the command line alone; see help(wireval.{verb})"]) from None
     if code == BAD_INPUT:
         raise InputError([f"wireval {verb}: nothing was run; the problems stand above"])
 

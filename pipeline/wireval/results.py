@@ -21,6 +21,8 @@ from reports.schema import ERRORS, FAILURES, OVERALL_FILE, POINTS, SIMULATORS, S
 from reports.simulators import folders_in
 from solver import VesselWall
 
+from ._arguments import require
+
 _SHOWN = ["case", "status", "frames", "frames_ok", "rms_mm", "tip_median_mm", "skill_strongest", "strongest_null"]
 
 
@@ -105,6 +107,7 @@ def read_results(out: str | Path) -> Results:
 
     Warns of cases whose files have changed since they were written, and of tables that belong to other cases.
     """
+    require(out=out)
     out = Path(out)
     if not out.is_dir():
         raise InputError([f"{out}: no such folder; give one that `wireval run` wrote"])
@@ -166,6 +169,7 @@ def wall_of(case: CaseFiles) -> VesselWall:
     from pipeline.segment.config import SegmentConfig
     from pipeline.segment.given import given_lumen
 
+    require(case=case)
     config, surface = SegmentConfig(), case.folder / "view" / "lumen.vtp"
     if not surface.is_file():
         raise InputError([f"{surface}: no such file; the case left no lumen, or view/ was not kept: run it again"])

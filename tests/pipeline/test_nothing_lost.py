@@ -691,6 +691,7 @@ def test_a_case_beyond_its_time_is_named_with_its_stage(
     failures = pd.read_csv(tmp_path / "out" / "failures.csv")
     assert list(failures["status"]) == ["over_limit"]
     assert "took longer than the 0.01 s" in failures["message"][0]
+    assert failures["stage"][0] in ("run", "load"), "it was empty where no stage was begun"
 
 
 # without pages, budget and simulated predictors, which are no matter here

@@ -75,6 +75,50 @@ def test_a_check_gives_sentences(study: Path, tmp_path: Path) -> None:
     assert wireval.check(tmp_path)[0].endswith("here or in frames/"), "a folder without scans"
 
 
+OTHER_KINDS = [None, 3, 1.5, True, [3], {3: 4}, {"a": 3}, "", b"x", "a\0b", object(), (1, 2), float("nan"), "x" * 5000]
+
+
+@pytest.mark.parametrize(
+    ("verb", "given"),
+    [
+        ("synth", {"scene": "no scene", "out": "out"}),
+        ("run", {"manifest": "none.toml", "out": "out", "settings": {}, "jobs": 1, "sweep": {}, "fail_if": ()}),
+        ("run", {"manifest": "none.toml", "out": "out", "junit": "there.xml", "only": "a", "help": False}),
+        ("score", {"manifest": "none.toml", "out": "out", "curves": "a=b", "fail_if": (), "settings": {}}),
+        ("calibrate", {"manifest": "none.toml", "out": "out", "settings": {}}),
+        ("diff", {"first": "none", "second": "none", "tolerance": "none.toml"}),
+        ("read_results", {"out": "none"}),
+        ("wall_of", {"case": None}),
+    ],
+)
+def test_an_argument_of_another_kind_is_refused_by_name(
+    verb: str, given: dict[str, object], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """They were 'int' object has no attribute 'items', "expected str, bytes or os.PathLike object", an error that is
+    not exported, and SystemExit(0)."""
+    monkeypatch.chdir(tmp_path)
+    for name in given:
+        for value in OTHER_KINDS:
+            with pytest.raises(wireval.InputError):
+                getattr(wireval, verb)(**{**given, name: value})
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"sweep": 3}, 'sweep: got 3; expected a mapping to lists of values, {"simulate.wall_scale": [0.5, 2]}'),
+        ({"fail_if": 3}, 'fail_if: got 3; expected a condition as text, "rms_mm>0.5", or a list of such'),
+        ({"out": b"out"}, "out: got b'out'; expected a path, as text or pathlib.Path"),
+        ({"manifest": "a\0b"}, "manifest: a\0b: cannot be opened (the name holds a zero byte)"),
+    ],
+)
+def test_what_was_found_and_what_is_allowed_is_said(given: dict[str, object], said: str) -> None:
+    with pytest.raises(wireval.InputError) as error:
+        wireval.run(**{"manifest": "none.toml", "out": "out", **given})
+    assert str(error.value).startswith(said)
+    assert wireval.check(3) == ["manifest: got 3; expected a path, as text or pathlib.Path"]
+
+
 def test_a_run_gives_frames(study: Path, tmp_path: Path) -> None:
     wall = {"simulate.wall_scale": [0.5]}
     kept = {"settings": {"solver.segment_mm": 2.0, "compare.simulated_nulls": False}, "quiet": True, "until": "compare"}

@@ -8,6 +8,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 from types import SimpleNamespace
@@ -56,6 +57,27 @@ def resident_of_a_worker() -> float:
 
 def own_memory(_: int) -> float:
     return workers.resident_mib(os.getpid())
+
+
+def test_a_server_that_is_killed_as_it_starts_costs_no_job(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It was a traceback of multiprocessing's (EOFError), and no case had a row in failures.csv."""
+    begin, killed = workers._start_server, list[int]()
+
+    def start() -> None:
+        begin()
+        server = multiprocessing.forkserver._forkserver._forkserver_pid
+        if len(killed) < most and server not in killed:
+            killed.append(server)
+            os.kill(server, signal.SIGSTOP)  # as if it still imported
+            threading.Timer(0.2, os.kill, (server, signal.SIGKILL)).start()
+
+    monkeypatch.setattr(workers, "_start_server", start)
+    most = 1
+    assert [(o.job, o.result) for o in run_all([7, 8], abs, 2)] == [(8, 8), (7, 7)]
+    most, killed = 99, []
+    (lost,) = run_all([7], abs, limits=Limits(seconds=20.0))
+    assert lost.lost
+    assert "killed twice" in lost.error
 
 
 def test_time_in_which_everything_was_suspended_does_not_count(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -31,6 +31,8 @@ PARTNERS = (3, 4, 6, 20)
 FEW = (3, 6, 12)
 FRAMES, FEWER, MORE = 30, 10, 50
 """Frames of an insertion; where lengths are unequal, from the fewest to the most."""
+SHORT = (3, 4, 5, 6, 8, 10, 15, 25, 30)
+"""Frames of insertions that are short."""
 
 
 @dataclass(frozen=True)
@@ -42,10 +44,11 @@ class Condition:
     between: float
     unequal: bool
     outliers: bool
+    frames: int = FRAMES
 
     @property
     def lengths(self) -> list[int]:
-        ends = (FEWER, MORE) if self.unequal else (FRAMES, FRAMES)
+        ends = (FEWER, MORE) if self.unequal else (self.frames, self.frames)
         return [round(n) for n in np.linspace(*ends, self.insertions)]
 
 
@@ -84,6 +87,22 @@ def coverage(c: Condition, repetitions: int) -> np.ndarray:
     """Shares (3,) of repetitions in which the interval of mean square, ratio and median holds the true value."""
     draw = np.random.default_rng([SEED, CONDITIONS.index(c)])
     return np.mean([covered(draw, c) for _ in range(repetitions)], axis=0)
+
+
+def coverage_of_short(frames: int, repetitions: int) -> np.ndarray:
+    """The same (3,) with so few frames in each insertion, the least over 3, 6 and 20 insertions.
+
+    With outliers, and insertions that do not differ otherwise: short ones often hold no outlier, and nothing tells then
+    how far off one is.
+    """
+    shares = []
+    for insertions in (3, 6, 20):
+        draw, c = (
+            np.random.default_rng([SEED, insertions, frames, 2]),
+            Condition(0.5, insertions, 0.0, False, True, frames),
+        )
+        shares.append(np.mean([covered(draw, c) for _ in range(repetitions)], axis=0))
+    return np.min(shares, axis=0)
 
 
 def covered_by_partners(draw: np.random.Generator, insertions: int) -> bool:
@@ -153,6 +172,11 @@ def main(repetitions: int = 4000) -> None:
             *np.column_stack([low, high]).ravel()
         )
     )
+    for frames in SHORT:
+        shares = coverage_of_short(frames, repetitions)
+        print(
+            "{} frames each: {:.3f} (mean square), {:.3f} (skill), {:.3f} (median)".format(frames, *shares), flush=True
+        )
     for insertions in PARTNERS:
         share = coverage_by_partners(insertions, repetitions)
         print(f"skill against the other insertions, {insertions} of them: {share:.3f}", flush=True)

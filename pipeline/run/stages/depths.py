@@ -41,6 +41,10 @@ LEAST_SCALE, CHANCE = 0.01, 1e-3
 CLEARLY = 2.5
 """By how many times less a wrong scale must leave than a wrong zero to be told for it, where a line is not sure of its
 slope: of right depths it is told of 1 to 2 in 1000, of those with a wrong zero, read to 0.5 mm, of 1 to 11."""
+BENT, BY_CHANCE = 0.5, 0.01
+"""Share of the mean scale by which scales at the first and the last depth must differ to be no one scale (of what grows
+as the square of the depth by 1 to 2, of a wrong voxel size by nothing), and how often that may be chance: of wrong
+voxel sizes 9 of 1700 were told so."""
 LEAST_MM, OF_MEDIAN = 0.5, 1.25
 """By how much the zero of depths must be off to be told, and a median's standard deviation over a mean's."""
 
@@ -169,11 +173,27 @@ def on_another_scale(frames: Sequence[Frame], depths_mm: Mapping[int, float]) ->
         if len(stated) <= FEWEST or left * CLEARLY > if_zero or not _scale_told(slope, deviation, len(stated) - 1):
             return []
         zero = f"; {left:.2f} mm rms are left, {if_zero:.2f} if all were counted from elsewhere"
+    if bent := _on_no_one_scale(stated, traced - stated):
+        return [bent]
     return [
         f"the traced wires grow {1.0 + slope:.3f} times as fast as insertion_mm states (standard deviation "
         f"{deviation:.2g}, {len(stated)} stated depths{zero}): is the scans' voxel size right, or the scale that "
         "depths were read from? With a wrong size all lengths and errors are as wrong"
     ]
+
+
+def _on_no_one_scale(stated: Array, apart: Array) -> str:
+    """A sentence where what stated depths (n,) are off by (n,) bends too clearly for a wrong scale; else empty."""
+    (bend, slope, _), covariance = np.polyfit(stated, apart, 2, cov=True)
+    first, last = slope + 2.0 * bend * stated[[0, -1]]
+    limit = float(stdtrit(len(stated) - 3, 1.0 - 0.5 * BY_CHANCE) * np.sqrt(covariance[0, 0]))
+    if abs(bend) <= limit or abs(last - first) <= 0.5 * BENT * abs(last + first):
+        return ""
+    return (
+        f"the traced wires grow {1.0 + first:.3f} times as fast as insertion_mm states at {stated[0]:g} mm and "
+        f"{1.0 + last:.3f} times at {stated[-1]:g} mm ({len(stated)} stated depths): no voxel size and no scale of "
+        "depths does that; does the wire slip or lie slack before the entry as it is pushed, or do traces cut corners?"
+    )
 
 
 def _scale_told(slope: float, deviation: float, freedom: int) -> bool:

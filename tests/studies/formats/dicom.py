@@ -118,6 +118,8 @@ def of_tags() -> Iterator[Made]:
             f"!{tag}",
             {},
         )
+    long = series(ImageOrientationPatient=[2, 0, 0, 0, 2, 0])
+    yield "dicom, orientation vectors of length 2", long, "!ImageOrientationPatient", {}
     yield "dicom, pixel spacing 0", series(PixelSpacing=[0, 0]), "!spacing", {}
     yield "dicom, pixel spacing -0.4", series(PixelSpacing=[-0.5, -0.4]), "!spacing", {}
     yield "dicom, more rows than pixels", series(Rows=700), "!cut short", {}

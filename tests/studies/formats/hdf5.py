@@ -38,6 +38,10 @@ def hdf5_variants() -> Iterator[Variant]:
         yield Variant(f"h5, {kind}", hdf5(kind=kind), values=numbered() if top == 1000 else numbered().astype(kind))
     for value in (0.5, [0.4, 0.5], "wide", [0.4, 0.5, -0.7], [0.0, 0.5, 0.7], [np.nan, 0.5, 0.7], None):
         yield Variant(f"h5, spacing {value}", hdf5(spacing_mm=value), "!spacing")
+    empty = h5py.Empty("f8")
+    for name, allowed in (("spacing_mm", "3 numbers"), ("direction", "9 numbers"), ("axes", "'z,y,x' or 'x,y,z'")):
+        said = f"!/volume has an empty attribute {name}; allowed: {allowed}"
+        yield Variant(f"h5, empty {name}", hdf5(**{name: empty}), said)
     yield Variant("h5, no origin", hdf5(origin_mm=None), "origin", origin=np.zeros(3))
     yield Variant("h5, no direction", hdf5(direction=None), "direction", direction=np.eye(3))
     yield Variant("h5, sheared", hdf5(direction=TURN + [[0, 0, 0.3], [0, 0, 0], [0, 0, 0]]), "!sheared")

@@ -40,6 +40,10 @@ def nifti_variants() -> Iterator[Variant]:
     yield Variant("nii, sform rounded to 1e-4", nifti((QFORM, "h", 0), (SROW, "f", 4e-5)), direction=tipped)
     yield Variant("nii, sform sheared", nifti((QFORM, "h", 0), (SROW, "f", 0.2)), "!sheared")
     yield Variant("nii, sform sheared, qform good", nifti((SROW, "f", 0.2)), "disagree")
+    flat, none = (SROW, "8f", (0.4, 0.5, 0.0, -20.0) * 2), (SROW, "12f", (0.0,) * 12)
+    for name, form in (("in one plane", flat), ("zeros", none)):
+        yield Variant(f"nii, sform {name}", nifti((QFORM, "h", 0), form), "!sform is singular")
+        yield Variant(f"nii, sform {name}, qform good", nifti(form), "sform is singular")
     yield Variant("nii, no unit", nifti((UNITS, "B", 0)), "unit")
     m = nifti((UNITS, "B", 1))
     yield Variant("nii, in metres", m, "!spacing")
