@@ -144,7 +144,7 @@ def _keep_what_is_seen(out: Path, found: Sequence[Result], among: Sequence[Found
     """
     scored = validation(among)
     placed, alike = told_of_kin(out, scored)
-    assumed = [*shared_scans(found), *placed, *strangers([case.result for case in among])]
+    assumed = [*shared_scans(found), *placed, *strangers([case.result for case in scored])]
     doubts = [*copies(scored), *alike, *exchanged(out, scored)]
     remove_files(out / AMONG)
     if assumed or doubts:
