@@ -49,6 +49,13 @@ def replacing(path: Path) -> Iterator[Path]:
                 temporary.unlink(missing_ok=True)
 
 
+def remove_files(*paths: Path) -> None:
+    """Remove files that are there; WriteError where the system refuses, and of a folder."""
+    for path in paths:
+        with writing(path):
+            path.unlink(missing_ok=True)
+
+
 def remove_leftovers(folder: Path) -> None:
     """Remove temporary files that processes of this machine which are no more have left in a folder."""
     for path in folder.glob(f".tmp-{HOST}-*"):

@@ -10,6 +10,7 @@ SIMULATED = "#0072B2"
 """The simulator's wire."""
 TRUE = "#009E73"
 """The wire of a synthetic study, as it was drawn into the scan."""
+WIRES = {"traced": TRACED, "simulated": SIMULATED, "true": TRUE}
 LUMEN = "#8A949E"
 BAD = "#B8336F"
 """What failed; no wire has this colour."""

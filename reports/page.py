@@ -11,7 +11,7 @@ from markupsafe import Markup
 
 from reports import _content, colours
 from reports.alike import of_what
-from reports.atomic import write_text
+from reports.atomic import remove_files, write_text
 from reports.figures import declared, figures_of
 from reports.figures._drawing import DOTS_PER_INCH, save
 
@@ -61,8 +61,7 @@ def section(page: str, entry: Mapping[str, Any], data: Any, folder: Path, embed:
     path = folder / "figures" / f"{entry['figure']}.png"
     drawing = figures_of(page)[entry["figure"]](data)
     if drawing is None:
-        path.unlink(missing_ok=True)
-        path.with_suffix(".csv").unlink(missing_ok=True)
+        remove_files(path, path.with_suffix(".csv"))
         return {}
     save(drawing, path)
     width, height = (round(DOTS_PER_INCH * inch) for inch in drawing.figure.get_size_inches())

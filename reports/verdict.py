@@ -216,7 +216,8 @@ def _skill(statistics: Mapping[str, Any]) -> tuple[str, float, float, float]:
         if isnan(least) and f"{column}_low" in str(statistics.get("interval")):  # named there: it has no lower end
             least = -inf
         if not isnan(skill) and name:
-            return _rival(str(name)) if column != "skill" else "the lumen's centreline", skill, least, most
+            strongest = f"the strongest trivial predictor: {meaning_of_rival(str(name))}"
+            return strongest if column != "skill" else "the lumen's centreline", skill, least, most
     return "", nan, nan, nan
 
 
@@ -280,10 +281,6 @@ def _of_frames(statistics: Mapping[str, Any]) -> str:
 
 def _interval_of(least: float) -> str:
     return f"its interval {'has no lower end' if least == -inf else f'reaches {skill_told(least)}'}"
-
-
-def _rival(name: str) -> str:
-    return f"the strongest trivial predictor: {meaning_of_rival(name)}"
 
 
 def meaning_of_rival(name: str) -> str:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.distance import pdist
 
 from pipeline.model import Array
 
@@ -95,9 +96,6 @@ def releases(snapped: Sequence[bool], shapes: Sequence[Shapes | None]) -> list[s
 
 def energy_score_mm(wires: Array, real: Array) -> float:
     """Energy score of wires (members, n, 3) for the real one (n, 3), by root mean square distance at equal arc."""
-    flat = wires.reshape(len(wires), -1) / np.sqrt(wires.shape[1])
-    square = np.sum(flat**2, axis=1)
-    apart = np.sqrt(np.maximum(square[:, None] + square[None] - 2.0 * flat @ flat.T, 0.0))
     # over pairs of different members: a member is no guess of itself
-    between = apart.sum() / (len(wires) * max(len(wires) - 1, 1))
+    between = pdist(wires.reshape(len(wires), -1) / np.sqrt(wires.shape[1])).mean()
     return float(_rms(wires - real).mean() - 0.5 * between)

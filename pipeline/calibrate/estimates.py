@@ -233,16 +233,11 @@ def _errors(last: Fit, evidence: Sequence[Evidence]) -> list[FrameError]:
     for n, one in enumerate(last.problem.evidence):
         turned = "in_both" if evidence[n].trial.turned else "as_calibrated" * one.trial.turned
         pairs = [(one.trial, p.points(x)[n]) for p, x in ((stated, before.x), (last.problem, last.linear.x))]
-        rows = [
-            one.rows(wires, pair[1]) for wires, pair in zip(replayed(pairs, last.problem.solver), pairs, strict=True)
-        ]
-        ends = np.cumsum(one.counts)
-        for i, (end, count) in enumerate(zip(ends, one.counts, strict=True)):
-            rms = [
-                float(np.sqrt(np.mean(np.sum(r.across_mm[end - count : end] ** 2, axis=1)))) if r.rests[i] else np.nan
-                for r in rows
-            ]
-            seen = one.trial.seen[i]
+        wires = replayed(pairs, last.problem.solver)
+        rows = [one.rows(own, point) for own, (_, point) in zip(wires, pairs, strict=True)]
+        for i, (run, seen) in enumerate(zip(one.runs, one.trial.seen, strict=True)):
+            squares = [np.sum(r.across_mm[run] ** 2, axis=1) if r.rests[i] else np.nan for r in rows]
+            rms = [float(np.sqrt(np.mean(some))) for some in squares]
             weight = float(last.linear.weights[n][i])
             found.append(FrameError(one.trial.name, seen.index, seen.curve.length_mm, rms[0], rms[1], weight, turned))
     return found

@@ -6,6 +6,7 @@ Derivatives are difference quotients of whole insertions, which are simulated si
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
@@ -110,8 +111,11 @@ class Problem:
 
     def points(self, x: Array) -> list[Point]:
         """A vector as one Point per case: the shared parameters and its own numbers."""
-        shared = self.held | {u.name: float(v) for u, v in zip(self.free, x, strict=False)}
-        return [Point(shared, x[part]) for part in self.parts]
+        return [Point(self.held | self.named(x), x[part]) for part in self.parts]
+
+    def named(self, x: Array) -> dict[str, float]:
+        """What a vector holds of the free unknowns, by name."""
+        return {u.name: float(v) for u, v in zip(self.free, x, strict=False)}
 
     def clipped(self, x: Array) -> Array:
         """A vector with its free unknowns clipped to their bounds."""
@@ -121,14 +125,10 @@ class Problem:
 
     def residuals(self, xs: Sequence[Array], weights: list[Array], scale: float) -> list[list[Array]]:
         """Whitened residuals of each insertion at several vectors."""
-        pairs = [(one.trial, p) for x in xs for one, p in zip(self.evidence, self.points(x), strict=True)]
-        wires = replayed(pairs, self.solver)
-        count = len(self.evidence)
-        points = [point for _, point in pairs]
-        return [
-            self.left(wires[first : first + count], points[first : first + count], weights, scale)
-            for first in range(0, len(wires), count)
-        ]
+        each = [self.points(x) for x in xs]
+        pairs = [(one.trial, p) for points in each for one, p in zip(self.evidence, points, strict=True)]
+        wires = iter(replayed(pairs, self.solver))
+        return [self.left(list(islice(wires, len(points))), points, weights, scale) for points in each]
 
     def left(
         self, wires: Sequence[Sequence[Solution]], points: Sequence[Point], weights: Sequence[Array], scale: float
@@ -158,24 +158,24 @@ class Problem:
 
     def linear(self, x: Array) -> Linear:
         """The problem linearised at a vector, all its difference quotients simulated side by side."""
-        here, pairs, steps = self.points(x), [], []
+        pairs, steps = [], []
         for i, one in enumerate(self.evidence):
             part, columns = self.parts[i], self.columns(i)
             deeper = x + STEP_DEPTH_MM * np.isin(np.arange(len(x)), part[OWN:])
             changed = [x + step * (np.arange(len(x)) == k) for k, step in columns.items()]
             pairs += [(one.trial, self.points(v)[i]) for v in (x, *changed, deeper)]
             steps.append(columns)
-        wires, base, slopes = iter(replayed(pairs, self.solver)), [], []
-        points = iter(pair[1] for pair in pairs)
+        base, slopes = [], []
+        simulated = zip(replayed(pairs, self.solver), (point for _, point in pairs), strict=True)
         for i, (one, columns) in enumerate(zip(self.evidence, steps, strict=True)):
-            still, _ = next(wires), next(points)
-            base.append(one.rows(still, here[i]))
-            across, push = np.zeros((*base[-1].across_mm.shape, len(x))), np.zeros((len(still), len(x)))
+            still = next(simulated)
+            base.append(one.rows(*still))
+            across, push = np.zeros((*base[-1].across_mm.shape, len(x))), np.zeros((len(base[-1].rests), len(x)))
             for k, step in columns.items():
-                across[:, :, k], push[:, k] = one.slopes(still, next(wires), (here[i], next(points)), step)
-            change, more = one.slopes(still, next(wires), (here[i], next(points)), STEP_DEPTH_MM)
-            for f, end in enumerate(np.cumsum(one.counts)):
-                run, entry = slice(end - one.counts[f], end), self.parts[i][OWN + f]
+                across[:, :, k], push[:, k] = one.slopes(still, next(simulated), step)
+            change, more = one.slopes(still, next(simulated), STEP_DEPTH_MM)
+            for f, run in enumerate(one.runs):
+                entry = self.parts[i][OWN + f]
                 across[run, :, entry], push[f, entry] = change[run], more[f]
             slopes.append((across, push))
         return self._assembled(x, base, slopes)

@@ -36,6 +36,9 @@ FARTHEST_MM, OUTLYING = 0.6, 4.0
 """A wire that moves farther (mm) in a difference quotient's step snaps: its derivative is taken as 0. A frame whose
 mean square is more than so many times that of the median frame is weighted down to that: a release must not decide."""
 
+Simulated = tuple[Sequence[Solution], Point]
+"""The wires of an insertion, and the parameters that they have."""
+
 
 @dataclass(frozen=True, eq=False)
 class Rows:
@@ -65,6 +68,12 @@ class Evidence:
     def counts(self) -> NDArray[np.int64]:
         """Number of points of every frame (frames,)."""
         return np.array([len(trace.arc_mm) for trace in self.traces], dtype=np.int64)
+
+    @cached_property
+    def runs(self) -> list[slice]:
+        """Where the points of every frame stand among those of all."""
+        ends = np.cumsum(self.counts).tolist()
+        return [slice(first, end) for first, end in zip([0, *ends], ends, strict=False)]
 
     @cached_property
     def stated(self) -> bool:
@@ -112,13 +121,11 @@ class Evidence:
         measured = np.nan if self.trial.force_N is None else self.trial.force_N
         return Rows(np.concatenate(across), measured - np.array(push), rests)
 
-    def slopes(
-        self, wires: Sequence[Solution], moved: Sequence[Solution], points: tuple[Point, Point], step: float
-    ) -> tuple[Array, Array]:
+    def slopes(self, still: Simulated, moved: Simulated, step: float) -> tuple[Array, Array]:
         """Derivatives of wires (points, 3) and forces (frames,): 0 for a frame that snaps or is not at rest."""
-        depths = zip(depths_at(self.trial, points[0]), depths_at(self.trial, points[1]), strict=True)
-        change, push = [], np.zeros(len(wires))
-        for i, (a, b, (here, there)) in enumerate(zip(wires, moved, depths, strict=True)):
+        here_mm, there_mm = (depths_at(self.trial, point) for _, point in (still, moved))
+        change, push = [], np.zeros(len(here_mm))
+        for i, (a, b, here, there) in enumerate(zip(still[0], moved[0], here_mm, there_mm, strict=True)):
             n = len(self.traces[i].arc_mm)
             if not (a.converged and b.converged and min(len(a.joints_mm), len(b.joints_mm)) > 2):
                 change.append(np.zeros((n, 3)))
@@ -137,13 +144,8 @@ class Evidence:
 
     def surprise(self, rows: Rows) -> Array:
         """Mean squares (frames,) of each frame's residuals by its own covariance, about 1 where all is as expected."""
-        squares, first = [], 0
-        for n in self.counts:
-            own = self.traced[first : first + n, first : first + n]
-            mine = rows.across_mm[first : first + n]
-            squares.append(float(np.sum(mine * np.linalg.solve(own, mine))) / (2 * n))
-            first += n
-        return np.array(squares)
+        each = [(self.traced[run, run], rows.across_mm[run]) for run in self.runs]
+        return np.array([np.sum(mine * np.linalg.solve(own, mine)) / (2 * len(mine)) for own, mine in each])
 
     def whitened(self, values: Array, force: Array, weights: Array, scale: float) -> Array:
         """Numbers of variance 1 (3 points + frames, ...) from values (points, 3, ...) and forces (frames, ...)."""

@@ -31,14 +31,12 @@ class Fit:
     @property
     def values(self) -> dict[str, float]:
         """Shared parameters by name, held ones included."""
-        free = {u.name: float(v) for u, v in zip(self.problem.free, self.linear.x, strict=False)}
-        return self.problem.held | free
+        return self.problem.held | self.problem.named(self.linear.x)
 
     @property
     def sd(self) -> dict[str, float]:
         """Standard deviations of the free parameters."""
-        deviations = np.sqrt(np.diag(self.linear.covariance))
-        return {u.name: float(v) for u, v in zip(self.problem.free, deviations, strict=False)}
+        return self.problem.named(np.sqrt(np.diag(self.linear.covariance)))
 
 
 def fitted(free: Sequence[Unknown], evidence: Sequence[Evidence], solver: SolverConfig) -> Fit:
@@ -48,7 +46,7 @@ def fitted(free: Sequence[Unknown], evidence: Sequence[Evidence], solver: Solver
     followed = [first.solved(x, FIRST_ROUNDS) for x in _starts(first)]
     best, starts = _best(first, followed, [u.name for u in slippery].index(ROLL))
     whole = Problem(tuple(free), {}, tuple(evidence), solver)
-    known = dict(zip((u.name for u in slippery), best.x, strict=False))
+    known = first.named(best.x)
     begin = [known.get(u.name, max(u.prior, FIRST_FRICTION) if u.name == FRICTION else u.prior) for u in free]
     return Fit(whole, whole.solved(np.concatenate([begin, best.x[len(slippery) :]])), starts)
 

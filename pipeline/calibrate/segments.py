@@ -88,6 +88,6 @@ def _moved(fit: Fit, coarse: Wires, fine: Wires) -> str:
     left = [problem.left(wires, points, about.weights, about.scale) for wires in (coarse, fine)]
     change = sum(j.T @ (new - old) for j, old, new in zip(about.jacobian, *left, strict=True))
     sds = np.abs(about.covariance @ change) / np.sqrt(np.diag(about.covariance))
-    asked = {u.name: float(sd) for u, sd in zip(problem.free, sds, strict=False)} or {ROLL: float(sds[OWN - 1])}
+    asked = problem.named(sds) or {ROLL: float(sds[OWN - 1])}
     most = max(asked, key=asked.__getitem__)
     return f"{most} by {asked[most]:.1f} of its standard deviations" if asked[most] > MOST_SD else ""

@@ -53,6 +53,7 @@ def main(args: argparse.Namespace) -> int:
     from pipeline.run.simulators import side_by_side
     from pipeline.status import InputError
     from pipeline.study.check import check
+    from reports.atomic import remove_files
     from reports.inside import misleading_links
     from reports.schema import SIMULATORS, WHERE
     from reports.simulators import PAGE
@@ -64,8 +65,8 @@ def main(args: argparse.Namespace) -> int:
     if problems := [*misleading_links(args.out), *said_once(found)]:
         raise InputError(problems)
     (args.out / "simulators").mkdir(parents=True, exist_ok=True)
-    for earlier in (SIMULATORS.file, WHERE.file, PAGE):  # a score that is ended would leave them
-        (args.out / earlier).unlink(missing_ok=True)
+    # a score that is ended would leave them
+    remove_files(*(args.out / earlier for earlier in (SIMULATORS.file, WHERE.file, PAGE)))
     sys.stderr.writelines(_lost(args.curves, [case.id for case in next(iter(plans.values())).cases]))
     totals = _judged(plans, args.quiet)
     warnings = said_once({name: warned(plan.out) for name, plan in plans.items()})

@@ -20,6 +20,7 @@ from pipeline.run.overall import Found, found_cases, frames_of, overall, shared_
 from pipeline.run.results import Result, Row, found_results, lost, write_json
 from pipeline.status import UsageError
 from reports import tables
+from reports.atomic import remove_files
 from reports.case_files import GOOD, not_reached, not_run, planned_frames
 from reports.doubts import AMONG, caveats_in, copied_from_traces, doubted, warnings_in
 from reports.gates import GATES, asked_of, with_page
@@ -143,9 +144,9 @@ def _keep_what_is_seen(out: Path, found: Sequence[Result], among: Sequence[Found
     """
     scored = validation(among)
     placed, alike = told_of_kin(out, scored)
-    assumed = [*shared_scans(found), *placed, *strangers([case.result for case in among])]
+    assumed = [*shared_scans(found), *placed, *strangers([case.result for case in scored])]
     doubts = [*copies(scored), *alike, *exchanged(out, scored)]
-    (out / AMONG).unlink(missing_ok=True)
+    remove_files(out / AMONG)
     if assumed or doubts:
         write_json(out / AMONG, {"assumptions": assumed, "doubts": doubts})
 
@@ -158,7 +159,7 @@ def _judged(
     Errors of wires that were made from the traces open no gate. overall : the row of the run into ``out``.
     scored : its cases.
     """
-    (out / GATES).unlink(missing_ok=True)
+    remove_files(out / GATES)
     if not asked:
         return {}, []
     copied = copied_from_traces(warnings_in(out))  # reads the results of all cases

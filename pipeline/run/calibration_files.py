@@ -9,7 +9,7 @@ import numpy as np
 
 from pipeline.calibrate.design import Predicted
 from pipeline.calibrate.estimates import Calibration, Estimate
-from pipeline.calibrate.unknowns import BENDING, FRICTION, REST, ROLL, TAPER, WALL, bent, lacking, wall_factor
+from pipeline.calibrate.unknowns import BENDING, FRICTION, REST, ROLL, TAPER, WALL, Unknown, bent, lacking, wall_factor
 from pipeline.model import Wire
 from pipeline.run.calibrated import data_of
 from pipeline.run.calibrated_wire import wire_rows
@@ -19,8 +19,8 @@ from pipeline.run.results import write_json
 from pipeline.study.parameters import Parameters, read_parameters
 from reports.atomic import write_text
 
-DEPTH = "depth_offset_mm"
-DEPTH_ENOUGH_MM = 0.25
+DEPTH = Unknown("depth_offset_mm", 0.0, 5.0, -np.inf, np.inf, 0.0, 0.25, "mm added to stated depths")
+"""What is not fitted, but taken from the depths that a fit leaves."""
 MISFIT = 2.0
 ADVICE = {
     ROLL: "a tip with a curve, seen free of the wall; a frame whose tip does not touch tells the roll best",
@@ -29,7 +29,7 @@ ADVICE = {
     WALL: "a softer wall or a sharper bend: the wire must press in by several times what the wall is known to",
     FRICTION: "the same depths once pushed and once pulled: friction changes sides",
     BENDING: "push_force_N of every frame, or a sag scan: a free overhang of a wire with weight_N_per_mm",
-    DEPTH: "insertion_mm of every frame, in three insertions or more",
+    DEPTH.name: "insertion_mm of every frame, in three insertions or more",
 }
 """What to measure so that a parameter is seen, by its name."""
 
@@ -43,16 +43,17 @@ def _advice(name: str, wire: Wire) -> str:
 def estimates_of(found: Gathered, fit: Calibration) -> list[dict[str, Any]]:
     """Rows of all parameters, the depth offset among them."""
     none = lacking(found.cases[0].wire)
-    rows = [_row(e) | ({"why": none[e.unknown.name][0]} if e.unknown.name in none else {}) for e in fit.estimates]
+    every = (*fit.estimates, _depth(found, fit))
+    rows = [_row(e) | ({"why": none[e.unknown.name][0]} if e.unknown.name in none else {}) for e in every]
     off = float(np.mean([_too_flat(voxels) for voxels in _thickness(found).values()] or [0.0]))
-    rows = [row | {"sd": float(np.hypot(row["sd"], off))} if row["name"] == REST else row for row in rows]
+    return [row | {"sd": float(np.hypot(row["sd"], off))} if row["name"] == REST else row for row in rows]
+
+
+def _depth(found: Gathered, fit: Calibration) -> Estimate:
     value, sd = depth_offset(found, fit)
-    seen = bool(np.isfinite(sd) and sd <= DEPTH_ENOUGH_MM)
-    why = "" if seen else "no depths are stated" if np.isnan(sd) else f"known to {sd:.2g} mm only"
+    why = "no depths are stated" if np.isnan(sd) else f"known to {sd:.2g} mm only" if sd > DEPTH.enough else ""
     known = float(np.nan_to_num(value))
-    row = {"name": DEPTH, "value": known, "sd": float(sd if np.isfinite(sd) else 5.0), "logarithmic": False}
-    rows.append(row | {"seen": seen, "used": known if seen else 0.0, "why": why})
-    return rows
+    return Estimate(DEPTH, known, sd if np.isfinite(sd) else DEPTH.sd, 0.0 if why else known, not why, why, ())
 
 
 def _row(e: Estimate) -> dict[str, Any]:
@@ -74,7 +75,7 @@ def write_parameters(path: Path, found: Gathered, fit: Calibration) -> Parameter
         f"rest_curvature_per_mm = {_text(wire.rest_curvature_per_mm)}",
         f"friction = {_text(values[FRICTION])}",
         f"roll_offset_deg = {_text(values[ROLL])}",
-        f"depth_offset_mm = {_text(by_name[DEPTH]['used'])}",
+        f"depth_offset_mm = {_text(by_name[DEPTH.name]['used'])}",
         f"absolute_stiffness = {json.dumps(_weighed(by_name))}",
     ]
     lines += ["", "[stated]", f"bending_stiffness_N_mm2 = {_text(first.wire.bending_stiffness_N_mm2)}"]
@@ -188,16 +189,11 @@ def write_record(path: Path, found: Gathered, fit: Calibration) -> None:
     rows = estimates_of(found, fit)
     names = [e.unknown.name for e in fit.estimates]
     profiles = {e.unknown.name: [[e.unknown.shown(v), rise] for v, rise in e.profile] for e in fit.estimates}
-    about = {e.unknown.name: e.unknown for e in fit.estimates}
     first, by_name = found.cases[0], {row["name"]: row for row in rows}
-    for row in rows:
-        unknown = about.get(row["name"])
-        row["what"] = unknown.what if unknown else "mm added to stated depths"
-        row["prior"] = unknown.shown(unknown.prior) if unknown else 0.0
-        row["prior_sd"] = unknown.sd if unknown else 5.0
-        row["bounds"] = [unknown.shown(unknown.low), unknown.shown(unknown.high)] if unknown else []
-        row["enough"] = unknown.enough if unknown else DEPTH_ENOUGH_MM
-        row["advice"] = "" if row["seen"] else _advice(row["name"], first.wire)
+    for row, u in zip(rows, (*(e.unknown for e in fit.estimates), DEPTH), strict=True):
+        row |= {"what": u.what, "prior": u.shown(u.prior), "prior_sd": u.sd, "enough": u.enough}
+        row["bounds"] = [u.shown(end) for end in (u.low, u.high) if np.isfinite(end)]
+        row["advice"] = "" if row["seen"] else _advice(u.name, first.wire)
     record = {
         "estimates": rows,
         "wire": wire_rows(first.wire, fit, by_name[REST]),

@@ -25,7 +25,7 @@ from pipeline.run.view import LumenFiles, write_view
 from pipeline.study.manifest import Case
 from pipeline.study.settings import Resolved
 from reports import tables
-from reports.atomic import WriteError, writing
+from reports.atomic import WriteError, remove_files, writing
 from reports.case_files import listed
 from reports.case_page import render_case
 from reports.page import Each, compiled
@@ -84,12 +84,8 @@ def clear(folder: Path) -> str:
         folder.mkdir(parents=True, exist_ok=True)
     known = ledger.read(folder)
     kept = [name for part in (ledger.VIEW, ledger.FIGURES) for name in ledger.remove(folder / part, known)]
-    for name in ledger.TOP:
-        with writing(folder / name):
-            (folder / name).unlink(missing_ok=True)
-    with writing(folder):
-        for path in folder.glob(".tmp-*"):  # of a run that was killed here: nobody else is at work in this folder
-            path.unlink(missing_ok=True)
+    remove_files(*(folder / name for name in ledger.TOP))
+    remove_files(*folder.glob(".tmp-*"))  # of a run that was killed here: nobody else is at work in this folder
     return f"not of a run, and kept: {listed(kept)}" * bool(kept)
 
 

@@ -1,13 +1,12 @@
 """What earlier runs have left in an output folder and a new one removes: records, and cases of other manifests."""
 
-from collections.abc import Sequence
 from contextlib import suppress
 from glob import escape
 from pathlib import Path
 
 from pipeline.run import ledger
 from pipeline.run.case import clear
-from reports.atomic import writing
+from reports.atomic import remove_files
 from reports.case_files import left_over
 from reports.records import read_json, run_records
 
@@ -20,8 +19,7 @@ def remove_arrays(out: Path, name: str) -> None:
     size = name.rpartition("-")[2]
     for path in run_records(out) if "-" in name else ():
         if "-" in path.name and not path.name.endswith(f"-{size}"):
-            with writing(path):
-                path.unlink(missing_ok=True)  # another shard may be at it, too
+            remove_files(path)
 
 
 def remove_records(out: Path, manifest: str) -> None:
@@ -34,15 +32,7 @@ def remove_records(out: Path, manifest: str) -> None:
         with suppress(ValueError):
             whose = read_json(path).get("manifest_sha256", "")
         if whose != manifest:
-            with writing(path):
-                path.unlink(missing_ok=True)
-
-
-def remove_over_all(out: Path, names: Sequence[str]) -> None:
-    """Remove files over all cases. A folder of such a name is refused."""
-    for path in (out / name for name in names):
-        with writing(path):
-            path.unlink(missing_ok=True)
+            remove_files(path)
 
 
 def _of_a_run(folder: Path) -> bool:
@@ -61,6 +51,6 @@ def remove_others(out: Path, manifest: str) -> None:
     for folder in filter(_of_a_run, left_over(out)):
         for place in (folder, *out.glob(f"sweep/*/cases/{escape(folder.name)}")):
             clear(place)
-            (place / "log.txt").unlink(missing_ok=True)
+            remove_files(place / "log.txt")
             with suppress(OSError):  # something of the user's own lies in it
                 place.rmdir()

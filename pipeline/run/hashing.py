@@ -10,12 +10,12 @@ from pathlib import Path
 
 from pipeline.load import parts_of
 from pipeline.run.helpers import forked, nothing
+from pipeline.study.sources import State, state_of
 
-_hashes: dict[tuple[Path, int, int, int, int], str] = {}
+_hashes: dict[tuple[Path, State | None], str] = {}
 """Hashes by path and state of the file, since resume check, stages and sweep points ask for the same gigabyte.
 
-The state (size, times, inode) only tells whether the file is still the same; the hash is of its content alone. A copy
-that keeps size and time of what it replaces, as ``cp -p`` and ``rsync -t`` make them, has another change time."""
+The state only tells whether the file is still the same; the hash is of its content alone."""
 
 
 def file_hash(path: Path) -> str:
@@ -31,8 +31,7 @@ def file_hash(path: Path) -> str:
 
 def _content_hash(path: Path) -> str:
     """SHA-256 of one file."""
-    stat = path.stat()
-    same = path, stat.st_size, stat.st_mtime_ns, stat.st_ctime_ns, stat.st_ino
+    same = path, state_of(path)
     if same not in _hashes:
         with path.open("rb") as handle:
             _hashes[same] = hashlib.file_digest(handle, "sha256").hexdigest()

@@ -15,13 +15,7 @@ from pipeline.load.wires import result_beside
 from pipeline.run.hashing import file_hash
 from pipeline.status import FrameStatus, StageError
 from pipeline.study.manifest import Case
-from pipeline.study.sources import files_of
-
-State = tuple[int, int, int, int]
-"""Size, times of the last change of content and of its entry, and number on its disk.
-
-A file that replaces another one has a number of its own; whoever puts back the time of its content (`rsync --inplace
---times`) cannot put back that of its entry. The time of a folder changes with the files that are put into it."""
+from pipeline.study.sources import State, files_of, state_of
 
 
 @dataclass(frozen=True)
@@ -33,12 +27,12 @@ class Inputs:
     @classmethod
     def of(cls, case: Case) -> "Inputs":
         """The files of a case as they are now."""
-        return cls({path: state for path in _all_of(case) if (state := _state(path))})
+        return cls({path: state for path in _all_of(case) if (state := state_of(path))})
 
     def changed(self) -> StageError | None:
         """What ends the case where a file is another one by now; one that is gone was read, or its frame says so."""
         for path, before in self.states.items():
-            now = _state(path)
+            now = state_of(path)
             if now and now != before:
                 what = f"{path} was written to, or replaced, while this case was computed from it"
                 do = "allowed: files that stay as they are; once it is complete, give the same command again"
@@ -133,15 +127,6 @@ def _all_of(case: Case) -> Iterator[Path]:
 def _with_parts(path: Path) -> tuple[Path, ...]:
     """A folder and all that is in it, or a file and what belongs to it."""
     return (path, *(path.rglob("*") if path.is_dir() else parts_of(path)))
-
-
-def _state(path: Path) -> State | None:
-    """The state of a file; None where it is not there."""
-    try:
-        stat = path.stat()
-    except OSError:
-        return None
-    return stat.st_size, stat.st_mtime_ns, stat.st_ctime_ns, stat.st_ino
 
 
 def times_of(case: Case) -> dict[str, int]:

@@ -16,7 +16,7 @@ from pipeline.run.aggregate import Totals, aggregate
 from pipeline.run.batch import elsewhere, run_all
 from pipeline.run.cache import Store, forget_lumen
 from pipeline.run.case import Job, clear, each_on, run_case, why_again
-from pipeline.run.earlier import remove_arrays, remove_others, remove_over_all, remove_records
+from pipeline.run.earlier import remove_arrays, remove_others, remove_records
 from pipeline.run.gate import Gate
 from pipeline.run.guards import guard_own
 from pipeline.run.hashing import file_hash
@@ -35,7 +35,7 @@ from pipeline.study.check import frames_of
 from pipeline.study.manifest import Case, Manifest
 from pipeline.study.plausible import among
 from pipeline.study.settings import to_toml
-from reports.atomic import WriteError, remove_leftovers, write_text, writing
+from reports.atomic import WriteError, remove_files, remove_leftovers, write_text, writing
 from reports.case_files import counted, provenance_of
 from reports.doubts import AMONG
 from reports.gates import GATES
@@ -179,7 +179,7 @@ def launch(plan: Plan) -> tuple[Totals, Path]:
         write_json(out / name, info | {"cases": []})
         write_text(out / "config.resolved.toml", to_toml(settings))
         write_json(provenance_of(out / name), this_run())
-        remove_over_all(out, OVER_ALL)
+        remove_files(*(out / file for file in OVER_ALL))
     except WriteError as error:
         raise UsageError([str(error)]) from error
     remove_leftovers(out)
@@ -204,7 +204,7 @@ def _refuse(plan: Plan) -> None:
     reasons = {case.id: why for case, why in plan.refused}
     bad = replace(plan, cases=tuple(case for case, _ in plan.refused))
     for job in [*bad.jobs, *bad.sweep_jobs]:
-        (job.folder / "log.txt").unlink(missing_ok=True)  # it tells of stages that this run did not come to
+        remove_files(job.folder / "log.txt")  # it tells of stages that this run did not come to
         _write_lost(Outcome(job, None, reasons[job.case.id], reasons[job.case.id], "refused"))
 
 

@@ -105,10 +105,9 @@ def shared_scans(results: Sequence[Result]) -> list[str]:
     ]
 
 
-def strangers(results: Sequence[Result]) -> list[str]:
+def strangers(scored: Sequence[Result]) -> list[str]:
     """That no insertion is known to be into the phantom of another, where there are several; else nothing."""
-    judged = [result for result in results if result.role != "calibration" and result.status != "simulated"]
-    insertions, phantoms = insertions_of(judged), phantoms_of(judged)
+    insertions, phantoms = insertions_of(scored), phantoms_of(scored)
     pairs = {(phantom, insertions[case]) for case, phantom in phantoms.items()}
     if len(set(insertions.values())) < 2 or len({phantom for phantom, _ in pairs}) < len(pairs):
         return []

@@ -17,6 +17,7 @@ from pipeline.run.results import LOST, Result, found_results, lost
 from pipeline.study.manifest import Case
 from pipeline.study.settings import Resolved, Setting, SettingsError, parse_assignment, resolve
 from reports import tables
+from reports.atomic import remove_files
 from reports.case_files import listed
 from reports.origin import why_not_pooled
 from reports.records import read_json, run_records
@@ -124,7 +125,7 @@ def write_sweep(out: Path, heads: Sequence[Head], *, earlier: bool = False) -> s
     """
     if not heads or why_not_pooled(out):
         there = earlier or (out / SWEEP.file).exists()
-        (out / SWEEP.file).unlink(missing_ok=True)
+        remove_files(out / SWEEP.file)
         again = "its points are kept, and the command with --sweep writes it again"
         return f"{out / SWEEP.file}: removed, it belongs to an earlier run: {again}" * there
     before = with_another(out, found_cases(out))

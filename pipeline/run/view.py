@@ -84,7 +84,7 @@ def write_view(
 
     written = lumen_there(known.lumen)
     shared(one, 2 + len(known.frames), cores, first)
-    for kind in ("traced", "simulated", "true"):
+    for kind in colours.WIRES:
         export.write_collection(folder, f"wire_{kind}")
     with_wire = [frame.index for frame in known.frames if frame.simulated is not None]
     shown = max(with_wire, default=0)
@@ -217,6 +217,5 @@ def _write_wire(
     known = {"rms_mm": "rms distance to the traced wire", "tip_mm": "distance of the tips"}
     numbers = {} if kind != "simulated" or frame.comparison is None else frame.comparison.values
     said = {text: float(numbers[column]) for column, text in known.items() if column in numbers}
-    colour = {"traced": colours.TRACED, "simulated": colours.SIMULATED, "true": colours.TRUE}[kind]
     path, label = folder / f"{name}.mrk.json", f"{kind} {frame.index:03d}"
-    export.write_markups_curve(path, points if curve is None else curve, label, colour, said)
+    export.write_markups_curve(path, points if curve is None else curve, label, colours.WIRES[kind], said)

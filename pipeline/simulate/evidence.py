@@ -164,12 +164,9 @@ def posterior(
 
 def disagreeing(left: Array, traces: Sequence[TraceSamples], voxel_mm: float) -> int | None:
     """Position in ``traces`` of the frame with the most surprising residuals; None where chance explains them."""
-    surprise, first = [], 0
-    for trace in traces:
-        n = len(trace.arc_mm)
-        mine = left[first : first + n]
+    surprise = []
+    for trace, mine in zip(traces, np.split(left, np.cumsum([len(t.arc_mm) for t in traces])[:-1]), strict=True):
         square = float(np.sum(mine * cho_solve(cho_factor(covariance_of([trace], voxel_mm)), mine)))
-        surprise.append((square - 2 * n) / np.sqrt(4 * n))
-        first += n
+        surprise.append((square - 2 * len(mine)) / np.sqrt(4 * len(mine)))
     worst = int(np.argmax(surprise))
     return worst if surprise[worst] > SURPRISING else None

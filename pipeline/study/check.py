@@ -169,16 +169,12 @@ def entry_problems(case: Case, scans: Scans) -> list[str]:
 
     seeds = [point for point in case.lumen_seed_mm if point != case.entry_mm]
     for name, points in (("entry_mm", [case.entry_mm]), ("lumen_seed_mm", seeds)):
-        if not points:
-            continue
-        index = grid.to_index(points)
-        for point, voxel in zip(points, index, strict=True):
+        for point in dict.fromkeys(points):
             if not held(point):
-                fits = fitting(point, held, grid)
+                fits, voxel = fitting(point, held, grid), grid.to_index(point).round(1).tolist()
                 corners = grid.to_mm([[0, 0, 0], [n - 1 for n in header.shape]]).round(1).tolist()
                 problems.append(
-                    f"{name} {list(point)} lies outside the scan (voxel {voxel.round(1).tolist()} of "
-                    f"{list(header.shape)}); the scan spans {corners[0]} to {corners[1]} mm in LPS; "
-                    f"{fits or 'check its coordinates'}"
+                    f"{name} {list(point)} lies outside the scan (voxel {voxel} of {list(header.shape)}); the scan "
+                    f"spans {corners[0]} to {corners[1]} mm in LPS; {fits or 'check its coordinates'}"
                 )
-    return list(dict.fromkeys(problems))
+    return problems

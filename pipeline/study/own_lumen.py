@@ -14,6 +14,7 @@ from pipeline.load.masks import mask_header
 from pipeline.model import Array, Branches, Shapes, Volume
 from pipeline.simulate.others import readings
 from pipeline.study.manifest import Case
+from pipeline.study.sources import State, state_of
 from solver.grid import Grid
 
 WHOLE = 1e-6
@@ -27,11 +28,10 @@ MOST_VOXELS = 400**3
 def lumen_problems(case: Case, lumen: Source, least_voxels: int) -> Sequence[str]:
     """What is wrong with a lumen; in a case that was found by its run alone, all others were computed before."""
     try:
-        files = [path.stat() for path in (lumen.path, *parts_of(lumen.path)) if path.exists()]
+        files = lumen.path, *parts_of(lumen.path)
     except LoadError as error:
         return [str(error)]
-    states = tuple((file.st_size, file.st_mtime_ns, file.st_ctime_ns, file.st_ino) for file in files)
-    return _problems(_At(tuple(case.entry_mm), case.entry_sigma_mm), lumen, least_voxels, states)
+    return _problems(_At(tuple(case.entry_mm), case.entry_sigma_mm), lumen, least_voxels, tuple(map(state_of, files)))
 
 
 class _At(NamedTuple):
@@ -42,7 +42,7 @@ class _At(NamedTuple):
 
 
 @cache
-def _problems(case: _At, lumen: Source, least_voxels: int, _states: tuple[tuple[int, ...], ...]) -> tuple[str, ...]:
+def _problems(case: _At, lumen: Source, least_voxels: int, _states: tuple[State | None, ...]) -> tuple[str, ...]:
     """Kept as long as the lumen's files stay as they are: `score` asks for each simulator, half a second each time."""
     return tuple(_found(case, lumen, least_voxels))
 

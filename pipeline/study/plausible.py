@@ -32,10 +32,8 @@ def first_of(case: Case, config: Config) -> Header | None:
     return None if source is None else read_header(source, config.load, case.spacing_mm)
 
 
-def leads_out(case: Case, header: Header | None) -> list[str]:
+def leads_out(case: Case, header: Header) -> list[str]:
     """A sentence where entry_direction points to the near edge of the scan. header : of a scan with that entry."""
-    if header is None:
-        return []
     ahead, behind = (_to_the_edge(case, header, sign) for sign in (1.0, -1.0))
     least = SHORT_WAY * max(case.insertion_mm) if case.insertion_mm else SHORT_MM
     if ahead >= least or behind < LONGER_BACK * ahead:
@@ -152,12 +150,11 @@ def _to_the_edge(case: Case, header: Header, sign: float) -> float:
         return float(max(0.0, np.nanmin(np.where(step != 0.0, (limit - start) / step, np.inf))))
 
 
-def other_voxels(header: Header | None) -> list[str]:
+def other_voxels(header: Header) -> list[str]:
     """A sentence where the manifest's ``spacing_mm`` stands in for another one that a scan states."""
-    notes = () if header is None else header.assumed
-    if any("lacks spacing" in note for note in notes):  # that is what the key is for
+    if any("lacks spacing" in note for note in header.assumed):  # that is what the key is for
         return []
-    return [f"spacing_mm: {note}; is that meant?" for note in notes if "where the file has" in note]
+    return [f"spacing_mm: {note}; is that meant?" for note in header.assumed if "where the file has" in note]
 
 
 def forgotten_reference(case: Case) -> list[str]:
@@ -173,10 +170,8 @@ def forgotten_reference(case: Case) -> list[str]:
     ]
 
 
-def lost_header(header: Header | None) -> list[str]:
+def lost_header(header: Header) -> list[str]:
     """A sentence where a scan has voxels of just 1 mm from 0, 0, 0 along the axes: as where its header was lost."""
-    if header is None:
-        return []
     grid = header.grid
     plain = np.all(grid.spacing_mm == 1.0) and np.all(grid.origin_mm == 0.0)
     if not plain or not np.all(np.isin(np.abs(grid.direction), (0.0, 1.0))):
@@ -190,14 +185,12 @@ def lost_header(header: Header | None) -> list[str]:
 THINNEST_VOXELS = 0.5
 
 
-def too_thin(case: Case, header: Header | None) -> list[str]:
+def too_thin(case: Case, header: Header) -> list[str]:
     """A sentence where the wire is so thin in its voxels that traces are worse than they say.
 
     Measured on bends (`wireval synth bend --voxel-mm`): 0.36 mm in voxels of 0.4 to 0.6 mm lie off by 0.9 to 1.2 times
     the stated sigma, in voxels of 0.8 mm by 2.5 times, with tips up to 0.7 mm off.
     """
-    if header is None or not case.frames or case.traces:
-        return []
     voxel, diameter = float(np.prod(header.spacing_mm) ** (1.0 / 3.0)), 2.0 * case.wire.radius_mm
     if diameter >= THINNEST_VOXELS * voxel:
         return []
@@ -207,10 +200,8 @@ def too_thin(case: Case, header: Header | None) -> list[str]:
     ]
 
 
-def slices_apart(case: Case, header: Header | None) -> list[str]:
-    """A sentence where slices lie so far apart that no trace is accepted. header : of a scan of the case."""
-    if header is None or not case.frames or case.traces:
-        return []
+def slices_apart(header: Header) -> list[str]:
+    """A sentence where slices lie so far apart that no trace is accepted."""
     far, near = float(header.spacing_mm.max()), float(header.spacing_mm.min())
     if far / near < MOST_APART:
         return []
@@ -222,16 +213,12 @@ def slices_apart(case: Case, header: Header | None) -> list[str]:
 
 def in_case(case: Case, scan: Header | None) -> list[str]:
     """What is doubtful in a case beside its wire and its truth. scan : header of a scan of the case."""
-    of_scan = [
-        *forgotten_reference(case),
-        *other_voxels(scan),
-        *lost_header(scan),
-        *leads_out(case, scan),
-        *loose_entry(case),
-        *odd_depths(case, scan),
-    ]
-    thin = [*too_thin(case, scan), *slices_apart(case, scan)]
-    return [*of_scan, *wrapped_rolls(case), *odd_wall(case.wall), *odd_catheter(case.catheter), *thin]
+    of_scan = [] if scan is None else [*other_voxels(scan), *lost_header(scan), *leads_out(case, scan)]
+    said = [*forgotten_reference(case), *of_scan, *loose_entry(case), *odd_depths(case, scan), *wrapped_rolls(case)]
+    said += [*odd_wall(case.wall), *odd_catheter(case.catheter)]
+    if scan is not None and case.frames and not case.traces:
+        said += [*too_thin(case, scan), *slices_apart(scan)]
+    return said
 
 
 def doubts(cases: Sequence[Case], config: Config) -> Iterator[str]:

@@ -18,6 +18,21 @@ from pipeline.status import InputError
 from pipeline.wording import saying
 
 MOST_MATCHES, LONGEST_PATTERN, LONGEST_NAME = 20_000, 4000, 255
+State = tuple[int, int, int, int]
+"""Size, times of the last change of content and of its entry, and number on its disk.
+
+A file that replaces another one has a number of its own; whoever puts back the time of its content (`rsync --inplace
+--times`, `cp -p`) cannot put back that of its entry. The time of a folder changes with the files that are put into
+it."""
+
+
+def state_of(path: Path) -> State | None:
+    """The state of a file, which tells whether it is still the same; None where it is not there."""
+    try:
+        known = path.stat()
+    except OSError:
+        return None
+    return known.st_size, known.st_mtime_ns, known.st_ctime_ns, known.st_ino
 
 
 def _source(value: Any, info: ValidationInfo) -> Source:

@@ -14,8 +14,7 @@ from typing import NamedTuple
 from reports import colours
 from reports.atomic import write_bytes
 
-_COLOURS = {"traced": colours.TRACED, "simulated": colours.SIMULATED, "true": colours.TRUE}
-_WIRE = re.compile(r"wire_(traced|simulated|true)_(\d+)\.(vtp|mrk\.json)")
+_WIRE = re.compile(rf"wire_({'|'.join(colours.WIRES)})_(\d+)\.(vtp|mrk\.json)")
 _DISPLAY = {"MarkupsCurve": "MarkupsDisplay"}  # of the others: their own name with "Display" behind it
 _CLASS = {"Volume": "ScalarVolume", "VolumeDisplay": "ScalarVolumeDisplay"}
 """Nodes whose class has another name than their tag."""
@@ -74,7 +73,7 @@ def _things(folder: Path, shown: int) -> Iterator[_Thing]:
         if found := _WIRE.fullmatch(file):
             kind, frame, ending = found.groups()
             seen = "true" if int(frame) == shown and ending == "vtp" else "false"
-            look = {"color": _triple(_COLOURS[kind]), "visibility": seen}
+            look = {"color": _triple(colours.WIRES[kind]), "visibility": seen}
             if ending == "vtp":
                 yield _Thing("Model", "ModelStorage", f"{kind} {frame}", file, look | {"lineWidth": "4"})
             else:

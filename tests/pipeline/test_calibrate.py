@@ -612,9 +612,6 @@ def test_the_offset_of_depths_is_little_known_from_few_insertions():
 def test_depths_of_one_insertion_are_one_offset(monkeypatch):
     """Three cases of one group: +- 0.044 mm and seen, where one case alone gives 0.5."""
     monkeypatch.setattr("pipeline.run.calibration.depths_at", lambda trial, _: trial.depths)
-    fit: Any = SimpleNamespace(
-        fit=SimpleNamespace(linear=SimpleNamespace(x=None), problem=SimpleNamespace(points=lambda _: [None] * 3))
-    )
     stated = tuple(np.array([10.0, 20.0, np.nan]) for _ in range(3))
     for groups, sd in (("aaa", SAME_MM), ("abc", over_insertions([0.4, 0.5, 0.6], [0.0] * 3)[1])):
         trials = [
@@ -622,23 +619,25 @@ def test_depths_of_one_insertion_are_one_offset(monkeypatch):
             for name, off in zip(groups, (0.4, 0.5, 0.6), strict=True)
         ]
         found: Any = SimpleNamespace(trials=trials, stated_mm=stated)
-        assert depth_offset(found, fit) == pytest.approx((0.5, sd), rel=0.01)
+        assert depth_offset(found, fit_to(3)) == pytest.approx((0.5, sd), rel=0.01)
+
+
+def fit_to(cases: int) -> Any:
+    """A fit, whose parameters no depth depends on."""
+    problem = SimpleNamespace(points=lambda _: [None] * cases)
+    return SimpleNamespace(fit=SimpleNamespace(linear=SimpleNamespace(x=None), problem=problem))
 
 
 def test_a_single_stated_depth_is_not_known_exactly(monkeypatch):
     """Its own standard error was 0, and that of two was taken with n for n - 1."""
     monkeypatch.setattr("pipeline.run.calibration.depths_at", lambda trial, _: trial.depths)
-    fit: Any = SimpleNamespace(
-        fit=SimpleNamespace(linear=SimpleNamespace(x=None), problem=SimpleNamespace(points=lambda _: [None] * 2))
-    )
     off = {"a": [10.3, 20.5], "b": [10.4, np.nan]}
     trials = [SimpleNamespace(group=name, depths=depths) for name, depths in off.items()]
     found: Any = SimpleNamespace(trials=trials, stated_mm=(np.array([10.0, 20.0]), np.array([10.0, np.nan])))
     sd = np.std([0.3, 0.5], ddof=1)
-    assert depth_offset(found, fit) == pytest.approx(over_insertions([0.4, 0.4], [sd / np.sqrt(2.0), sd]))
+    assert depth_offset(found, fit_to(2)) == pytest.approx(over_insertions([0.4, 0.4], [sd / np.sqrt(2.0), sd]))
     found = SimpleNamespace(trials=trials[1:], stated_mm=(np.array([10.0, np.nan]),))
-    fit.fit.problem.points = lambda _: [None]
-    assert depth_offset(found, fit)[1] == pytest.approx(np.sqrt(2.0) * SAME_MM)
+    assert depth_offset(found, fit_to(1))[1] == pytest.approx(np.sqrt(2.0) * SAME_MM)
 
 
 @pytest.mark.parametrize("stated", ["", "uncertainty = { traces_mm = 0.0 }", "uncertainty = { traces_mm = 0.03 }"])

@@ -304,7 +304,6 @@ def test_a_header_that_looks_lost_is_a_warning(tmp_path: Path, spacing_mm: float
     turn = np.diag([-1.0, -1.0, 1.0])
     header = Header(Source(tmp_path), (96,) * 3, np.full(3, spacing_mm), np.full(3, origin_mm), turn, "int16")
     assert len(lost_header(header)) == told
-    assert lost_header(None) == []
 
 
 @pytest.mark.parametrize(
@@ -382,11 +381,11 @@ def test_slices_in_which_no_trace_is_accepted_are_doubted(tmp_path: Path, slices
     case = read_manifest(written(tmp_path, GOOD)).cases[0]
     spacing = np.array([0.3, 0.3, slices_mm])
     header = Header(Source(tmp_path / "a.mha"), (99, 99, 99), spacing, np.array([-9.0, 0, 0]), np.eye(3), "int16")
-    said = slices_apart(case, header)
+    said = slices_apart(header)
     assert len(said) == told
     assert all("slices of 0.9 mm and pixels of 0.3 mm, 3.0 times" in text for text in said)
     assert set(said) <= set(in_case(case, header))
-    assert slices_apart(case.model_copy(update={"traces": case.frames}), header) == []
+    assert not set(said) & set(in_case(case.model_copy(update={"traces": case.frames}), header))
 
 
 @pytest.mark.parametrize(("radius_mm", "modulus_gpa"), [(0.18, 9.5), (0.444, 9.5), (0.444, 158.4), (0.1, 60.0)])

@@ -467,6 +467,13 @@ def test_a_folder_where_a_run_writes_is_named_before_anything_is_run(
     assert (tmp_path / name).is_dir()
 
 
+def test_a_folder_where_a_report_writes_is_named(out: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """It ended in a traceback."""
+    (out / "gates.json").mkdir()
+    assert main(["report", str(out), "--overview"]) == 1
+    assert f"{out / 'gates.json'}: cannot be written: Is a directory; remove this folder" in capsys.readouterr().err
+
+
 def test_leftovers_of_the_dead_go_and_those_of_the_living_stay(study: Path, whole: Path, out: Path) -> None:
     dead, living = (out / f".tmp-{atomic.HOST}-{n}-0123abcd-run.json" for n in (2**22 + 1, os.getppid()))
     inside = case_of(out) / f".tmp-{atomic.HOST}-1-0123abcd-errors.csv"

@@ -16,7 +16,6 @@ from data_synthetic import catalogue
 from data_synthetic.catalogue.scene import NamedScene
 from data_synthetic.catalogue.study import Study
 from tests.studies import catalogue as small
-from tests.studies import coverage
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "data_synthetic" / "CATALOGUE.md"
@@ -47,7 +46,7 @@ def page() -> str:
     for name in catalogue.names():
         scene = catalogue.describe(name)
         picture = f'<img src="../reports/pictures/catalogue/{name}.png" width="150" alt="{name}">'
-        tried = ", ".join(coverage.TRIED[name])
+        tried = ", ".join(scene.tries)
         rows.append(f"| `{name}` | {scene.why} | {expected(scene)} | {tried} | {picture} |")
     return HEAD.format(seed=small.SEED, frames=small.FRAMES) + "\n".join(rows) + "\n"
 

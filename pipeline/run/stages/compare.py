@@ -40,7 +40,7 @@ def compare_frames(run: Context, known: Known) -> Known:
     known = replace(known, frames=frames, entries=entries)
     run.log.warnings += [
         *_too_near(known.frames, run.config.compare.sample_mm, handed=run.case.simulated is not None),
-        *_truth_elsewhere(known.frames, _voxel_mm(known)),
+        *_truth_elsewhere(known.frames, float(max(known.vessel.distance.spacing_mm))),
         *_rough_truth(known),
     ]
     return known
@@ -161,11 +161,6 @@ def _rough_truth(known: Known) -> list[str]:
     """A warning of true wires whose points are so far apart that they cut corners."""
     wires = {f.index: f.truth_mm for f in known.frames if f.truth_mm is not None}
     return rough(wires, known.vessel.distance.voxel_mm, "the true wires", "give a point every millimetre")
-
-
-def _voxel_mm(known: Known) -> float:
-    """The largest edge of the voxels of the lumen, without which nothing is compared."""
-    return float(max(known.vessel.distance.spacing_mm))
 
 
 def _too_near(frames: Sequence[Frame], sample_mm: float, *, handed: bool) -> list[str]:
