@@ -30,8 +30,7 @@ def narrow_of_short(statistics: Mapping[str, Any]) -> str:
     good, of = (value_of(statistics.get(key)) for key in ("frames_ok", "insertions"))
     if isnan(value_of(statistics.get("rms_low_mm"))) or not good < SHORT * of:
         return ""
-    few = f"Below {SHORT} frames an insertion (here {good / of:.3g}) intervals may be too narrow"
-    return f"{few}: with one frame in 20 far off, 85 % of those over 5 frames hold the true value."
+    return f"Intervals over insertions of {good / of:.3g} frames, fewer than {SHORT}, may be too narrow."
 
 
 def alone_in(statistics: Mapping[str, Any], skill: float, least: float, most: float) -> str:

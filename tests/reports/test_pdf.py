@@ -129,5 +129,5 @@ def test_figures_have_200_dots_an_inch_and_fill_their_pages(tmp_path: Path) -> N
             dots = picture.get_array().shape[1] / (axes.get_position().width * page.figure.get_figwidth())
             assert 195 < dots < 205
             assert axes.get_position().y0 > BOTTOM
-    assert [len(page.figure.axes) for page in pages] == [2, 2, 2, 2]
+    assert [len(page.figure.axes) for page in pages] == [3, 2, 2, 2]
     assert max(page.at for page in pages) < 0.2
