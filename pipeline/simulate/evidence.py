@@ -79,6 +79,16 @@ def _knot(trace: TraceSamples) -> float:
     return trace.knot_mm if np.isfinite(trace.knot_mm) else KNOT_MM
 
 
+def _smooth(sigma: Array, trace: TraceSamples) -> Array:
+    """What of standard deviations (n,) changes by no more than a factor of e over the length of the correlation.
+
+    A point that is correlated with its neighbours and four times as uncertain would tell the error that they share:
+    where a gap is bridged, the clamp was held to be known twice as well as with no such point.
+    """
+    apart = np.abs(trace.arc_mm[:, None] - trace.arc_mm[None, :]) / (CORRELATED_KNOTS * _knot(trace))
+    return np.asarray(np.min(sigma[None, :] * np.exp(apart), axis=1, initial=np.inf))
+
+
 def _bell(a: TraceSamples, b: TraceSamples) -> Array:
     """Correlation (n, m) of errors along the traces of two frames."""
     length = CORRELATED_KNOTS * 0.5 * (_knot(a) + _knot(b))
@@ -97,13 +107,15 @@ def covariance_of(traces: Sequence[TraceSamples], voxel_mm: float) -> Array:
 def covariance_of_traces(traces: Sequence[TraceSamples], voxel_mm: float) -> Array:
     """Covariance, mm^2, of one component at all points of all frames: the errors of the traces alone."""
     arc = np.concatenate([trace.arc_mm for trace in traces])
-    sigma = np.concatenate([sigma_across(trace, voxel_mm) for trace in traces])
+    whole = [sigma_across(trace, voxel_mm) for trace in traces]
+    smooth = np.concatenate([_smooth(sigma, trace) for sigma, trace in zip(whole, traces, strict=True)])
     all_bells, own_bells = np.block([[_bell(a, b) for b in traces] for a in traces]), [_bell(a, a) for a in traces]
     shared = np.sqrt(SHARED_FARTHER + (SHARED - SHARED_FARTHER) * np.exp(-0.5 * (arc / SHARED_MM) ** 2))
     alone = np.sqrt(1.0 - shared**2)
     bells = all_bells * np.outer(shared, shared) + block_diag(*own_bells) * np.outer(alone, alone)
     rough = np.concatenate([np.full(len(trace.arc_mm), trace.rough_mm) for trace in traces])
-    return np.asarray(((1.0 - OWN) * bells + OWN * np.eye(len(arc))) * np.outer(sigma, sigma) + np.diag(rough**2))
+    by_itself = np.concatenate(whole) ** 2 - smooth**2 + rough**2
+    return np.asarray(((1.0 - OWN) * bells + OWN * np.eye(len(arc))) * np.outer(smooth, smooth) + np.diag(by_itself))
 
 
 def roughness_mm(left: Sequence[Array], traces: Sequence[TraceSamples], voxel_mm: float) -> float:

@@ -20,7 +20,7 @@ from pipeline.run.stages.known import Frame
 from pipeline.simulate import together
 from pipeline.simulate.clamp import Prior, TracedFrame, depth_from, estimated_clamp, moved
 from pipeline.simulate.clamp_told import IF_AS_MODELLED, left_out
-from pipeline.simulate.evidence import TraceSamples, posterior, roughness_mm, sigma_across
+from pipeline.simulate.evidence import TraceSamples, covariance_of, posterior, roughness_mm, sigma_across
 from pipeline.simulate.way import Stop, Way
 from pipeline.status import FrameStatus, StageError
 from solver import GuideWire, Insertion, Solution
@@ -188,6 +188,28 @@ def test_a_trace_is_less_certain_where_it_begins() -> None:
     arc = np.array([0.0, 0.7, 7.0])
     trace = TraceSamples(0, arc, np.zeros((3, 3)), np.full(3, 0.02), knot_mm=1.4)
     assert sigma_across(trace, 0.3) == pytest.approx(0.02 * np.sqrt([2.0, 1.0 + np.exp(-0.5), 1.0]))
+
+
+@pytest.mark.parametrize("uncertain", [[1], [3, 4], [12], range(8, 12), range(16, 20)])
+def test_a_point_that_is_less_certain_than_its_neighbours_makes_the_clamp_no_more_certain(
+    uncertain: Sequence[int],
+) -> None:
+    """Where a gap was bridged a clamp was held to be known twice as well: correlated with its neighbours, a point that
+    is four times as uncertain told the error that they share."""
+    arc = np.arange(0.5, 10.1, 0.5)
+    known = TraceSamples(0, arc, np.zeros((20, 3)), np.full(20, 0.035), 3.8)
+    less = replace(known, sigma_mm=np.where(np.isin(np.arange(20), uncertain), 0.15, known.sigma_mm))
+    place_and_tilt = np.eye(3)[:, :2] * np.stack([np.ones(20), arc], axis=1)[:, None, :]
+    at, held = np.zeros(2), np.zeros(2, bool)
+
+    def sigmas(traces: Sequence[TraceSamples]) -> Array:
+        jacobian = np.concatenate([place_and_tilt] * len(traces))
+        noise = covariance_of(traces, VOXEL_MM)
+        return np.sqrt(np.diag(posterior(jacobian[..., 0], jacobian, noise, np.array([0.15, 0.035]), held, at)[1]))
+
+    assert np.all(sigmas([less]) >= 0.98 * sigmas([known]))
+    assert np.all(sigmas([known, less]) >= 0.98 * sigmas([known, known]))
+    assert np.all(sigmas([known, less]) <= 1.01 * sigmas([known])), "a trace more takes no knowledge away"
 
 
 def test_a_clamp_far_from_what_the_manifest_says_of_it_is_told_by_what_is_off() -> None:
