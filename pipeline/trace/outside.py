@@ -11,7 +11,7 @@ from pipeline.model import Array
 from pipeline.trace.onward import RAY_MM, RAY_STEP, TANGENT_MM
 from pipeline.trace.section import PHI, RING_BLURS
 from pipeline.trace.subtraction import CREST_VOXELS, Subtraction
-from pipeline.trace.ways import CONE, cone
+from pipeline.trace.ways import cone
 
 OUTSIDE_CONE = 0.85
 """Least cosine between the wire's end and the way on which the lumen may have ended too early."""
@@ -52,8 +52,7 @@ def seen_outside(image: Subtraction, line: Array) -> bool:
     h, tip = image.voxel, line[-1]
     heading = tip_tangent(line, TANGENT_MM)
     s = np.arange(1.0, RAY_MM, h)
-    directions = cone(heading, float(np.arccos(CONE)), RAY_STEP)
-    directions = directions[directions @ heading > OUTSIDE_CONE]
+    directions = cone(heading, float(np.arccos(OUTSIDE_CONE)), RAY_STEP)
     points = (tip + s[:, None, None] * directions).reshape(-1, 3)
     depth = image.depth_at(points).reshape(len(s), -1)
     out = np.mean(depth > OUTSIDE_VOXELS * h, axis=0) > 0.5

@@ -30,7 +30,7 @@ def files(folder: Path) -> dict[str, bytes]:
 
 
 @pytest.mark.parametrize("before", FORMATS)
-@pytest.mark.parametrize("after", ["dicom", *later("mha", "h5")])
+@pytest.mark.parametrize("after", ["mha", *later("dicom", "h5")])
 def test_nothing_is_left_of_the_earlier_study(
     longer: Study, shorter: Study, tmp_path: Path, before: str, after: str
 ) -> None:

@@ -122,7 +122,7 @@ def ways(seed: int) -> list[Way]:
 
 
 def truth(way: Way, physics: Physics, step_mm: float = 0.2) -> tuple[TrueFrame, ...]:
-    """The true wires of an insertion; its push forces stand beside, see ``push_forces``."""
+    """The true wires of an insertion; its push forces stand beside, see ``push_force``."""
     wall = way.wall * (physics.soft if way.wall == SOFT else physics.stiff) * physics.bending
     entry, direction = way.start
     axis = normal_to(np.array([1.0, 0.0, 0.0]), direction)
