@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -23,6 +24,7 @@ from pipeline.run.stages.load import each_frame
 from pipeline.run.stages.repeated import copies, kept, scanned_twice
 from pipeline.status import InputError
 from pipeline.study.manifest import Case
+from pipeline.study.parameters import same_wall
 from pipeline.study.settings import Config
 from reports.case_files import counted
 
@@ -76,6 +78,11 @@ def chosen(cases: Sequence[Case]) -> tuple[Case, ...]:
         stated = ", ".join(f"{friction} of {case!r}" for friction, case in frictions.items())
         what = f"the calibration cases state {len(frictions)} coefficients of friction ({stated}), and one is fitted"
         raise CalibrationError([f"{what}; state one, or calibrate a manifest for each"])
+    walls = sorted({case.wall.stiffness_N_mm2 for case in found})
+    near = [(soft, hard) for soft, hard in pairwise(walls) if same_wall(soft, hard)]
+    if near:
+        what = "the calibration cases state walls of {!r} and {!r} N/mm2, which nothing tells apart".format(*near[0])
+        raise CalibrationError([f"{what}; state one stiffness_N_mm2 for both"])
     given = [case.id for case in found if case.parameters is not None]
     if given:
         what = f"case {given[0]!r} has parameters already, which a calibration would be made on top of"

@@ -81,7 +81,8 @@ def write_parameters(path: Path, found: Gathered, fit: Calibration) -> Parameter
     lines += ["", "[stated]", f"bending_stiffness_N_mm2 = {_text(first.wire.bending_stiffness_N_mm2)}"]
     lines.append(f"rest_curvature_per_mm = {_text(first.wire.rest_curvature_per_mm)}")
     for stated in walls:
-        lines += ["", "[[wall]]", f"stated_N_mm2 = {_text(stated)}"]
+        # in full: a run knows a wall by it
+        lines += ["", "[[wall]]", f"stated_N_mm2 = {json.dumps(stated)}"]
         lines.append(f"stiffness_N_mm2 = {_text(stated * wall_factor(stated, values))}")
     for row in rows:
         lines += ["", "[[estimate]]", *(f"{key} = {_text(value)}" for key, value in row.items())]
