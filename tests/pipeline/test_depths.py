@@ -95,7 +95,7 @@ def test_lengths_that_are_left_outside_are_told_as_such() -> None:
     assert perhaps_turned(seen)[0].message.startswith("too short; are these the lengths left outside (ins")
     seen = frames(DEPTHS, outside)
     (said,) = on_another_scale(seen, from_entry(seen))
-    assert said.startswith("the traced wires get longer where insertion_mm gets less: are these the lengths left")
+    assert said.startswith("the traced wires get longer where insertion_mm states less: are these the lengths left")
 
 
 def test_a_zero_is_as_well_known_as_the_entry_and_the_ruler_are() -> None:

@@ -178,7 +178,7 @@ def on_another_scale(frames: Sequence[Frame], depths_mm: Mapping[int, float]) ->
             return []
         zero = f"; {left:.2f} mm rms are left, {if_zero:.2f} if all were counted from elsewhere"
     if _runs_down(stated, traced):
-        return [f"the traced wires get longer where insertion_mm gets less: {OUTSIDE}"]
+        return [f"the traced wires get longer where insertion_mm states less: {OUTSIDE}"]
     if bent := _on_no_one_scale(stated, traced - stated):
         return [bent]
     return [
@@ -190,7 +190,8 @@ def on_another_scale(frames: Sequence[Frame], depths_mm: Mapping[int, float]) ->
 
 def _runs_down(stated: Array, traced: Array) -> bool:
     """Whether traced lengths (n,) fall by as much as stated depths (n,) grow: no scale does that."""
-    return len(stated) >= FEWEST_ALIKE and np.ptp(stated) > 0 and abs(np.polyfit(stated, traced, 1)[0] + 1.0) < NEAR_ONE
+    known = len(stated) >= FEWEST_ALIKE and np.ptp(stated) > 0.0
+    return bool(known and abs(np.polyfit(stated, traced, 1)[0] + 1.0) < NEAR_ONE)
 
 
 def _on_no_one_scale(stated: Array, apart: Array) -> str:
