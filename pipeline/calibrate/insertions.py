@@ -18,8 +18,8 @@ NUMBERS = (
     (ENTRY, "along the wire"),
     (ENTRY, "across, first axis"),
     (ENTRY, "across, second axis"),
-    (DIRECTION, "degrees to the first axis"),
-    (DIRECTION, "degrees to the second axis"),
+    (DIRECTION, "to the first axis"),
+    (DIRECTION, "to the second axis"),
     (WALL, "wire's surface to the wall"),
     (ROLL, "turned"),
 )

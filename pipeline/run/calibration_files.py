@@ -133,9 +133,9 @@ def no_common_roll(fit: Calibration) -> list[str]:
 
 def contradicted(fit: Calibration) -> list[str]:
     """A warning of each parameter of which the traces tell little, but more than what is stated."""
+    todo = "mend what the misfit names first" if misfit(fit) else "state it nearer to that, and calibrate again"
     return [
-        f"{e.unknown.name}: {e.why}; {e.unknown.shown(e.used):.3g} is taken with its standard deviation: state it "
-        "nearer to that, and calibrate again"
+        f"{e.unknown.name}: {e.why}; {e.unknown.shown(e.used):.3g} is taken with its standard deviation: {todo}"
         for e in fit.contradicted
     ]
 
