@@ -15,7 +15,7 @@ from pipeline.register.frames import record
 from pipeline.run import ledger
 from pipeline.run.calibrated import data_of
 from pipeline.run.inputs import contents_of, described, stated
-from pipeline.run.log import STAGES, Log, Stage
+from pipeline.run.log import Log, early_end
 from pipeline.run.occupied import owner_of
 from pipeline.run.outputs import failure_rows, message_of
 from pipeline.run.stages import Known
@@ -183,7 +183,7 @@ def names_of(case: Case, known: Known) -> tuple[str, ...]:
 
 def result_of(case: Case, known: Known, summary: dict[str, Any], key: str, details: dict[str, Any]) -> Result:
     """The result of a case that went through the stages."""
-    early = _early(details["until"])
+    early = early_end(details["until"])
     frames = [
         {
             "status": f.status,
@@ -204,12 +204,6 @@ def result_of(case: Case, known: Known, summary: dict[str, Any], key: str, detai
     phantom = "" if source is None else digest(source)
     inputs = scans, names_of(case, known), stated(case), contents_of(details["inputs"])
     return Result(*head, frames, failure_rows(case.id, known), summary, key, phantom, *inputs, details)
-
-
-def _early(until: Stage) -> str:
-    """The sentence of what is ok where a run was to end before frames are compared; else empty."""
-    whole = STAGES.index(until) >= STAGES.index("compare")
-    return "" if whole else f"nothing failed up to where the run was to end (--until {until})"
 
 
 def untold(name: str) -> Result:
