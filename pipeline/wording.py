@@ -39,7 +39,7 @@ def sentences(error: ValidationError, data: Any, schema: Schema) -> Iterator[tup
         if item["type"] == WHOLE_CASE:
             yield from ((place[:2], f": {problem}") for problem in item["ctx"]["problems"])
         elif item["type"] in UNKNOWN:
-            yield place, _no_such_key(schema, place)
+            yield place, _no_such_key(schema, place, _value(data, place))
         elif item["type"] == "missing" and isinstance(key := item["loc"][-1], str):
             yield (*place, key), MISSING
         elif item["type"] != "default_factory_not_called":  # it depends on another key, which has an error of its own
@@ -141,11 +141,39 @@ def _node(schema: Schema, place: Place) -> tuple[Schema, bool]:
     return node, needed
 
 
-def _no_such_key(schema: Schema, place: Place) -> str:
-    key = str(place[-1])
-    if len(place) == 1 and "case" in schema.get("properties", {}) and key in _keys(schema, ("case", 0)):
-        return f": unknown key; it belongs to a case: write it below its [[case]], a table as [case.{key}]"
-    return f": unknown key; {did_you_mean(key, _keys(schema, place[:-1]))}"
+def _no_such_key(schema: Schema, place: Place, found: Any) -> str:
+    key, here = str(place[-1]), ".".join(part for part in place[:-1] if isinstance(part, str))
+    homes = {name: header for name, header, own in _tables(schema, schema) if _is_key(own.get(key), schema, found)}
+    if not homes:
+        return f": unknown key; {did_you_mean(key, _keys(schema, place[:-1]))}"
+    if isinstance(found, dict):
+        where = f"write {' or '.join(f'[{name}.{key}]' for name in homes)}"
+    else:
+        around = any(here.startswith(f"{name}.") for name in homes)
+        where = f"write it above [{here}]" if around else "write it there"
+    return f": unknown key; it is a key of {' or '.join(homes.values())}: {where}"
+
+
+def _is_key(node: Schema | None, schema: Schema, found: Any) -> bool:
+    """Whether a table with this node for a key, if any, takes what was found there: a table, or something else."""
+    if node is None or node == WRITTEN_HERE:
+        return False
+    tables = [one.get("type") == "object" for one in _branches(node, schema.get("$defs", {}))]
+    return any(tables) if isinstance(found, dict) else not all(tables)
+
+
+def _tables(schema: Schema, node: Schema, name: str = "") -> Iterator[tuple[str, str, Schema]]:
+    """(name, header, keys) of every table within one, those below [[double brackets]] and under chosen names, too."""
+    for key, of in node.get("properties", {}).items():
+        inside = f"{name}.{key}".strip(".")
+        for one in _branches(of, schema.get("$defs", {})):
+            several, chosen = one.get("items", {}), one.get("additionalProperties") or {}
+            at, header = (f"{inside}.NAME", f"[{inside}.NAME]") if chosen else (inside, f"[{inside}]")
+            header = f"[[{inside}]]" if several else header
+            for table in _branches(several or chosen or one, schema.get("$defs", {})):
+                if "properties" in table:
+                    yield at, header, table["properties"]
+                    yield from _tables(schema, table, at)
 
 
 def _keys(schema: Schema, place: Place) -> list[str]:

@@ -27,6 +27,14 @@ def alike(rows: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
     return [{**own[0], "count": len(own), "files": _files(own), **_of_frames(own)} for own in groups.values()]
 
 
+def line_of(row: Mapping[str, Any]) -> str:
+    """One line for all frames that failed alike: a row that ``alike`` gave."""
+    of = f" {row['of']}" * bool(row["of"])
+    said = f"in frame {row['frame']}: {row['message']}" if row["count"] > 1 and row["message"] else row["message"]
+    files = f"{row['files']}; " * bool(row["files"])
+    return f"{row['case']}{of}: {row['status']}: {files}{said or row['sentence']}"
+
+
 def _of_frames(rows: Sequence[Mapping[str, Any]]) -> dict[str, str]:
     numbers = [row["frame"] for row in rows if _stated(row)]
     return {"frames": in_words(numbers), "of": frames_in_words(numbers) if numbers else ""}

@@ -33,7 +33,12 @@ COLUMNS = (
     Column("value", "-", "where the wires meet the traces best", "text"),
     Column("sd", "-", "one standard deviation: how far the true value may be off; " + OF_FACTORS, "text"),
     Column("used", "-", USED, "text"),
-    Column("seen", "-", "known well enough to be taken, or, with a warning, contradicting what is stated", "text"),
+    Column(
+        "seen",
+        "-",
+        "known well enough to be taken, or contradicting what is stated; a reservation is said above",
+        "text",
+    ),
     Column("prior", "-", PRIOR, "text"),
     Column("bounds", "-", "values outside are not tried", "text"),
     Column("meaning", "-", "what it is", "text"),
@@ -57,6 +62,16 @@ RATIOS = (
     "the shaft's EI and not the tip's: multiply EI all along, and stiffness_N_mm2 of every wall, in parameters.toml "
     "by your shaft's EI over the one here. That changes no shape."
 )
+MOVED = (
+    Column("insertion", "-", "its cases", "text"),
+    Column("of", "-", "what was moved: where the wire is held, which way it enters, the wall, the roll", "text"),
+    Column("how", "-", "along the wire or across it; of the wall below 0: away from the wire, a wider lumen", "text"),
+    Column("moved", "-", "from what is stated, in mm, of direction and roll in degrees"),
+    Column("sd", "-", "one standard deviation", "text"),
+    Column("prior", "-", "one standard deviation of what is stated, in a run as in a fit", "text"),
+)
+BEYOND = 3.0
+"""Prior standard deviations beyond which a number of an insertion is marked."""
 PLANNED = (
     COLUMNS[0],
     Column("sd", "-", "one standard deviation as the planned study would find it; " + OF_FACTORS, "text"),
@@ -77,6 +92,8 @@ def render_calibration(out: Path) -> Path:
         "used": record["used"],
         "insertions": counted(len({one["group"] for one in record["used"]}), "insertion"),
         "unseen": unseen,
+        "doubted": [row for row in rows if row["seen"] and row["why"]],
+        "moved": _moved(record.get("insertions", [])),
         "traces": _of_the_traces(record),
         "gained": gained(record["frames"]),
         "starts": [(number(roll), number(value)) for roll, value in record["starts"]],
@@ -97,6 +114,27 @@ def _wire(rows: Sequence[Mapping[str, Any]]) -> Grid | None:
         return None
     told = [{**row, "sd": _spread({**row, "logarithmic": True}, "sd") if row["sd"] > 0 else "held"} for row in rows]
     return grid(pd.DataFrame(told), WIRE, nothing=NOTHING)
+
+
+def _moved(rows: Sequence[Mapping[str, Any]]) -> Grid | None:
+    """What each insertion was moved by for itself; None in a record that does not tell."""
+    if not rows:
+        return None
+    told = [
+        {
+            **{name: row[name] for name in ("insertion", "of", "how")},
+            "moved": row["value"],
+            "sd": number(row["sd"], 2) if row["prior_sd"] else "exact",
+            "prior": number(row["prior_sd"], 2) if row["prior_sd"] else "exact",
+        }
+        for row in rows
+    ]
+    return grid(
+        pd.DataFrame(told),
+        MOVED,
+        bad=[abs(row["value"]) > BEYOND * row["prior_sd"] > 0.0 for row in rows],
+        nothing=NOTHING,
+    )
 
 
 def _of_the_traces(record: Mapping[str, Any]) -> str:
@@ -161,16 +199,23 @@ def gained(frames: Sequence[Mapping[str, Any]]) -> str:
     known = pd.DataFrame(frames, columns=["depth_mm", "before_mm", "after_mm"]).astype(float).dropna()
     if known.empty:
         return ""
-    before, after = (
-        float(np.sqrt(np.average(known[name] ** 2, weights=known["depth_mm"]))) for name in ("before_mm", "after_mm")
-    )
+    before, after = (_rms_mm(known, name) for name in ("before_mm", "after_mm"))
     said = "" if after < GAINED * before else ": no nearer" if after < before / GAINED else ": farther away"
     turned = {str(frame.get("turned", "")) for frame in frames}
     alone = next((words for where, words in TURNED.items() if where in turned), "")
+    given = pd.DataFrame(frames, columns=["depth_mm", "as_given_mm"]).astype(float).dropna()
+    walls = (
+        "" if given.empty else f"; with the walls as they are given it is {number(_rms_mm(given, 'as_given_mm'))} mm"
+    )
     return (
         f"the wires of {counted(len(known), 'fitted frame')} lie {number(before)} mm rms from their traces as stated, "
-        f"{number(after)} mm as calibrated{alone}{said}"
+        f"{number(after)} mm as calibrated{alone}{said}; clamps and walls are fitted to both{walls}"
     )
+
+
+def _rms_mm(frames: pd.DataFrame, name: str) -> float:
+    """Root mean square of a column, each frame with the weight of its length."""
+    return float(np.sqrt(np.average(frames[name] ** 2, weights=frames["depth_mm"])))
 
 
 def _row(row: dict[str, Any]) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 import re
 
 _PLACE = re.compile(r" \(at line (\d+), column \d+\)$")
+_COMMA = re.compile(r"= *([+-]?\d+),(\d+)")
 _AT_END = "end of document"
 _SHOWN = 60
 _VALUE = "a value is a number, true or false, a text in quotes, or a list in brackets"
@@ -29,7 +30,10 @@ def not_toml(where: object, text: str, error: Exception) -> str:
     said = str(error)
     general = f"a line is key = value, [table] or # a comment; {_VALUE}"
     allowed = next((words for piece, words in ALLOWED.items() if piece in said), general)
-    return f"{where}{_line(text, said)}: not valid TOML; {allowed}"
+    line = _line(text, said)
+    number = _COMMA.search(line)
+    point = f"; write decimals with a point: {number[1]}.{number[2]}" if number else ""
+    return f"{where}{line}: not valid TOML; {allowed}{point}"
 
 
 def _line(text: str, said: str) -> str:

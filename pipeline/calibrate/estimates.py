@@ -15,8 +15,8 @@ from pipeline.calibrate.fit import Linear, Problem
 from pipeline.calibrate.residuals import Evidence
 from pipeline.calibrate.search import Fit, fitted, held_at_prior
 from pipeline.calibrate.segments import Segments, resolved
-from pipeline.calibrate.trials import replayed
-from pipeline.calibrate.unknowns import ROLL, Unknown, spread_in_words
+from pipeline.calibrate.trials import WALL_OFFSET, replayed
+from pipeline.calibrate.unknowns import ROLL, Unknown, spread_in_words, two_digits
 from pipeline.model import Array
 from pipeline.simulate.config import SolverConfig
 
@@ -54,7 +54,8 @@ class Estimate:
 class FrameError:
     """Root mean square distance of a frame's wire to its trace, across, mm: as stated and as calibrated.
 
-    turned : whether its insertion was turned for itself: "in_both", "as_calibrated" alone, or empty.
+    as_given_mm : as calibrated, but with the walls where they are given, nothing else following.     turned : whether
+    its insertion was turned for itself: "in_both", "as_calibrated" alone, or empty.
     """
 
     case: str
@@ -62,6 +63,7 @@ class FrameError:
     depth_mm: float
     before_mm: float
     after_mm: float
+    as_given_mm: float
     weight: float
     turned: str
 
@@ -71,6 +73,7 @@ class Calibration:
     """Parameters, their correlations (of those that were free at first), errors of each frame, and the fit.
 
     scale : factor on the traces' covariance that the residuals ask for; it sets their size where traces state none.
+    apart : why the insertions have no common roll, empty where they have.
     """
 
     estimates: tuple[Estimate, ...]
@@ -79,6 +82,7 @@ class Calibration:
     fit: Fit
     scale: float
     segments: Segments
+    apart: str = ""
 
     @property
     def values(self) -> dict[str, float]:
@@ -116,7 +120,8 @@ def calibrated(free: Sequence[Unknown], evidence: Sequence[Evidence], solver: So
         for e, sd in zip(found, deviations, strict=True)
     )
     correlation = covariance / np.outer(deviations, deviations)
-    return Calibration(estimates, correlation, tuple(_errors(last, evidence)), last, last.linear.scale, segments)
+    errors = tuple(_errors(last, evidence))
+    return Calibration(estimates, correlation, errors, last, last.linear.scale, segments, apart[ROLL])
 
 
 def _with_the_stated(whole: Fit, found: list[Estimate], *, no_roll: bool) -> tuple[list[Estimate], Fit]:
@@ -155,7 +160,7 @@ def _judged(unknown: Unknown, fit: Fit, profile: tuple[tuple[float, float], ...]
     rise = max((rise for v, rise in profile if v == unknown.prior), default=0.0)
     if apart or not why or not rise > CONTRADICTED:
         return found
-    return _contradicted(found, f"there the objective is higher by {rise:.2g}")
+    return _contradicted(found, f"there the objective is higher by {two_digits(rise)}")
 
 
 def _contradicted(e: Estimate, why: str) -> Estimate:
@@ -174,7 +179,7 @@ def _unseen(unknown: Unknown, value: float, sd: float, profile: tuple[tuple[floa
     if flat:
         return f"the objective hardly rises towards {', '.join(f'{unknown.shown(v):.3g}' for v in flat)}"
     if unknown.at_an_end(value):
-        return f"it runs to the end of its range, {unknown.shown(value):.3g}"
+        return unknown.end_told(value)
     return ""
 
 
@@ -232,12 +237,15 @@ def _errors(last: Fit, evidence: Sequence[Evidence]) -> list[FrameError]:
     found: list[FrameError] = []
     for n, one in enumerate(last.problem.evidence):
         turned = "in_both" if evidence[n].trial.turned else "as_calibrated" * one.trial.turned
-        pairs = [(one.trial, p.points(x)[n]) for p, x in ((stated, before.x), (last.problem, last.linear.x))]
+        points = [p.points(x)[n] for p, x in ((stated, before.x), (last.problem, last.linear.x))]
+        as_given = replace(points[1], own=np.where(np.arange(len(points[1].own)) == WALL_OFFSET, 0.0, points[1].own))
+        pairs = [(one.trial, point) for point in (*points, as_given)]
         wires = replayed(pairs, last.problem.solver)
         rows = [one.rows(own, point) for own, (_, point) in zip(wires, pairs, strict=True)]
         for i, (run, seen) in enumerate(zip(one.runs, one.trial.seen, strict=True)):
             squares = [np.sum(r.across_mm[run] ** 2, axis=1) if r.rests[i] else np.nan for r in rows]
             rms = [float(np.sqrt(np.mean(some))) for some in squares]
             weight = float(last.linear.weights[n][i])
-            found.append(FrameError(one.trial.name, seen.index, seen.curve.length_mm, rms[0], rms[1], weight, turned))
+            here = one.trial.name, seen.index, seen.curve.length_mm
+            found.append(FrameError(*here, rms[0], rms[1], rms[2], weight, turned))
     return found

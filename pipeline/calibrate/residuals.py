@@ -22,8 +22,8 @@ from solver import Solution
 
 EVERY_MM = 1.5
 """Between the points of a trace that are fitted; its own ends are left out."""
-WALL_VOXELS, WALL_BELL_MM = 0.1, 3.0
-"""Local error of a segmented wall: standard deviation in voxels, and the length (mm) over which it is correlated."""
+WALL_BELL_MM = 3.0
+"""Length (mm) over which the local error of a segmented wall is correlated."""
 MODEL_VOXELS, MODEL_BELL_MM = 0.15, 6.0
 """Error of the model in each single frame though all parameters are right (where the wire sticks by friction, what a
 contact that opens or closes decides): standard deviation in voxels, and the length (mm) over which it is correlated.
@@ -90,7 +90,7 @@ class Evidence:
         """Covariance (points, points), mm^2, of one component: the errors of wall and model, without the traces'."""
         arc = np.concatenate([trace.arc_mm for trace in self.traces])
         bell = np.exp(-0.5 * ((arc[:, None] - arc[None, :]) / WALL_BELL_MM) ** 2)
-        wall = (WALL_VOXELS * self.trial.voxel_mm) ** 2 * bell
+        wall = self.trial.wall_sigmas_mm[1] ** 2 * bell
         frame = np.repeat(np.arange(len(self.counts)), self.counts)
         bell = np.exp(-0.5 * ((arc[:, None] - arc[None, :]) / MODEL_BELL_MM) ** 2)
         # a clamped wire is where it is held

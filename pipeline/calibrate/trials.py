@@ -14,10 +14,14 @@ from pipeline.simulate.way import Stop, Way
 from solver import Insertion, Solution, VesselWall
 
 LUMEN_VOXELS = 0.15
-"""Standard deviation, voxels, of the offset of the whole wall from where it was segmented: it is hard to tell from the
-wall's stiffness."""
+"""Standard deviation, voxels, of the offset of the whole wall from where it was segmented, where the manifest states
+none: it is hard to tell from the wall's stiffness."""
+WALL_VOXELS = 0.1
+"""The same of a segmented wall from place to place."""
 OWN = 7
 """Unknowns of an insertion itself: the clamp's place (3) and tilts (2), the wall's offset, its own roll."""
+WALL_OFFSET = 5
+"""Which of them is the wall's offset."""
 OWN_STEPS = np.array([STEP_MM] * 3 + [STEP_RAD] * 2 + [0.02, 1.0])
 UNKNOWN_ROLL_DEG = 104.0
 """Standard deviation of a roll of which nothing is known: uniform over a whole turn."""
@@ -30,8 +34,9 @@ class Trial:
 
     seen : the frames that are fitted.     passed : those whose trace is refused, which the wire went through as well.
     roll_free : the roll is not stated.     roll_sigma_deg : how well it is where it is: an offset that all insertions
-    share is told from what each was turned by mistake.     force_N : (frames,) measured push, NaN where it is not;
-    force_sigma_N : its standard deviation.
+    share is told from what each was turned by mistake.     lumen_bias_mm, lumen_mm : how well the wall is known, as a
+    whole and from place to place, None where that is not stated.     force_N : (frames,) measured push, NaN where it is
+    not; force_sigma_N : its standard deviation.
     """
 
     name: str
@@ -45,6 +50,8 @@ class Trial:
     voxel_mm: float
     roll_free: bool = False
     roll_sigma_deg: float = 0.0
+    lumen_bias_mm: float | None = None
+    lumen_mm: float | None = None
     catheter: OverWire | None = None
     force_N: Array | None = None
     force_sigma_N: float = 1e-3
@@ -65,7 +72,16 @@ class Trial:
         """Prior standard deviations (OWN + frames,) of what belongs to this insertion alone; 0 is exact."""
         tips = np.hypot([np.nan_to_num(f.curve.tip_sigma_mm) for f in self.seen], TIP_VOXELS * self.voxel_mm)
         roll = UNKNOWN_ROLL_DEG if self.roll_free else self.roll_sigma_deg
-        return np.concatenate([self.prior.sigmas, [LUMEN_VOXELS * self.voxel_mm, roll], tips])
+        return np.concatenate([self.prior.sigmas, [self.wall_sigmas_mm[0], roll], tips])
+
+    @property
+    def wall_sigmas_mm(self) -> tuple[float, float]:
+        """Standard deviations of the wall, mm, as a whole and from place to place."""
+        bias, local = LUMEN_VOXELS * self.voxel_mm, WALL_VOXELS * self.voxel_mm
+        return (
+            bias if self.lumen_bias_mm is None else self.lumen_bias_mm,
+            local if self.lumen_mm is None else self.lumen_mm,
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +102,7 @@ def insertion_at(trial: Trial, point: Point, solver: SolverConfig) -> Insertion:
     stiffness = trial.wall.stiffness_N_mm2 * wall_factor(trial.wall.stiffness_N_mm2, point.shared)
     vessel = trial.vessel.like(stiffness_N_mm2=stiffness, friction=point.shared.get(FRICTION, trial.wall.friction))
     # a wall that is nearer by some length is the same as a wire with a radius larger by it
-    wire = replace(trial.wire, radius_mm=max(trial.wire.radius_mm + float(point.own[5]), 1e-3))
+    wire = replace(trial.wire, radius_mm=max(trial.wire.radius_mm + float(point.own[WALL_OFFSET]), 1e-3))
     return inserted(vessel, bent(wire, point.shared), moved(trial.given, point.own[:5]), solver, 1.0, trial.catheter)
 
 

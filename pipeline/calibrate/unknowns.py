@@ -51,6 +51,14 @@ class Unknown:
         low = bool(np.isclose(value, self.low)) and (self.logarithmic or self.low < 0.0)
         return low or bool(np.isclose(value, self.high))
 
+    def end_told(self, value: float) -> str:
+        """That a value is at the end of its range."""
+        return f"it runs to the end of its range, {self.shown(value):.3g}"
+
+    def one_sided(self, value: float) -> bool:
+        """Whether a value is at the end of what is possible, as a friction of 0."""
+        return bool(np.isclose(value, self.low)) and not self.at_an_end(value)
+
 
 def spread_in_words(sd: float, *, logarithmic: bool) -> str:
     """A standard deviation to two digits, no exponent; of a factor's logarithm in per cent, or as a factor itself.
@@ -59,8 +67,12 @@ def spread_in_words(sd: float, *, logarithmic: bool) -> str:
     """
     if logarithmic and sd > 0.3:
         return f"a factor of {np.exp(sd):.2g}"
-    value = 100.0 * sd if logarithmic else sd
-    return (f"{value:.2g}" if value < 99.5 else f"{value:.0f}") + " %" * logarithmic
+    return two_digits(100.0 * sd if logarithmic else sd) + " %" * logarithmic
+
+
+def two_digits(value: float) -> str:
+    """A number to two digits, no exponent: 9.4e+03 is no sentence."""
+    return f"{value:.2g}" if value < 99.5 else f"{value:.0f}"
 
 
 def _factor(name: str, sd: float, most: float, step: float, what: str) -> Unknown:

@@ -59,7 +59,7 @@ def positions_of(path: Path, markup: dict[str, Any]) -> NDArray[np.float64]:
         each = [(p["position"], p.get("positionStatus", "defined")) for p in markup["controlPoints"]]
     unplaced = [n for n, (_, status) in enumerate(each) if status != "defined"]
     if unplaced:
-        got = f"{len(unplaced)} control points that are not placed, the first is {unplaced[0]}"
+        got = f"{len(unplaced)} control points that are not placed, the first is point {unplaced[0]}"
         raise refused(path, got, "defined positions", "place or delete them and save the curve again")
     try:
         points = of_json([position for position, _ in each])
@@ -119,7 +119,9 @@ def _without_points(head: list[str]) -> str:
     if unit:
         return f"has columns in {unit}; expected x, y, z; name them so and write '# unit: {unit}' above"
     shown = ", ".join(c if c.isprintable() else ascii(c) for c in head[:8]) + " ..." * (len(head) > 8)
-    return f"has columns {shown}; expected x_mm, y_mm, z_mm (or x, y, z), separated by commas; write them so"
+    return (
+        f"has columns {shown}; expected x_mm, y_mm, z_mm (or x, y, z), separated by commas or semicolons; write them so"
+    )
 
 
 def _is_number(text: str) -> bool:

@@ -219,7 +219,9 @@ def _checked(name: str, points: Array) -> OtherFile:
         return OtherFile(name, problem=f"got an array of shape {points.shape}; expected points (n, 3)")
     bad = np.flatnonzero(~np.all(np.isfinite(points), axis=1))
     if len(bad):
-        return OtherFile(name, problem=f"{len(bad)} of {len(points)} points are NaN or infinite, the first is {bad[0]}")
+        return OtherFile(
+            name, problem=f"{len(bad)} of {len(points)} points are NaN or infinite, the first is point {bad[0]}"
+        )
     points = distinct(points)
     if len(points) < 2:
         return OtherFile(name, problem=f"got {len(points)} different points; a wire has two or more")

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +17,7 @@ from pipeline.model import Array
 from pipeline.run.cache import Store
 from pipeline.run.inputs import Inputs
 from pipeline.run.log import Log
+from pipeline.run.outputs import failure_rows
 from pipeline.run.stages import Context, run_stages
 from pipeline.run.stages.given import trial_of
 from pipeline.run.stages.known import Frame, Known, trusted
@@ -23,7 +25,9 @@ from pipeline.run.stages.load import each_frame
 from pipeline.run.stages.repeated import copies, kept, scanned_twice
 from pipeline.status import InputError
 from pipeline.study.manifest import Case
+from pipeline.study.parameters import same_wall
 from pipeline.study.settings import Config
+from reports.alike import alike, line_of
 from reports.case_files import counted
 
 SAME_MM = 0.5
@@ -76,6 +80,11 @@ def chosen(cases: Sequence[Case]) -> tuple[Case, ...]:
         stated = ", ".join(f"{friction} of {case!r}" for friction, case in frictions.items())
         what = f"the calibration cases state {len(frictions)} coefficients of friction ({stated}), and one is fitted"
         raise CalibrationError([f"{what}; state one, or calibrate a manifest for each"])
+    walls = sorted({case.wall.stiffness_N_mm2 for case in found})
+    near = [(soft, hard) for soft, hard in pairwise(walls) if same_wall(soft, hard)]
+    if near:
+        what = "the calibration cases state walls of {!r} and {!r} N/mm2, which nothing tells apart".format(*near[0])
+        raise CalibrationError([f"{what}; state one stiffness_N_mm2 for both"])
     given = [case.id for case in found if case.parameters is not None]
     if given:
         what = f"case {given[0]!r} has parameters already, which a calibration would be made on top of"
@@ -104,6 +113,7 @@ def gathered(cases: Sequence[Case], config: Config, store: Store, say: Say) -> G
         warnings += [OWN_CLAMP.format(case.id, case.entry)] * bool(case.entry)
         warnings += [f"{case.id}: {text}" for one in taken for text in _scanned_twice(case, frames, one)]
         say(f"{case.id}: {len(frames)} of {len(known.frames)} frames are fitted")
+        warnings += [f"not fitted: {line_of(row)}" for row in alike(failure_rows(case.id, known))]
         taken.append(_taken(run, known, frames))
         warnings += [f"{case.id}: {text}" for text in _doubtful(taken[-1].trial)]
     if not taken:
@@ -178,8 +188,9 @@ def calibrate(found: Gathered, config: Config) -> Calibration:
     ends = [e for e in fit.contradicted if e.unknown.at_an_end(e.value)]
     if ends:
         todo = "nothing is saved; state it nearer to that, or correct the wire's profile, the lumen or the rolls"
-        each = [(e, f"it runs to the end of its range, {e.unknown.shown(e.value):.3g}") for e in ends]
-        raise CalibrationError([f"{e.unknown.name}: {e.why}; {where}: {todo}" for e, where in each])
+        each = [(e, e.unknown.end_told(e.value)) for e in ends]
+        said = [(e.unknown.name, e.why if e.why.endswith(end) else f"{e.why}; {end}") for e, end in each]
+        raise CalibrationError([f"{name}: {why}: {todo}" for name, why in said])
     return fit
 
 

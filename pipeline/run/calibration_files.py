@@ -9,6 +9,7 @@ import numpy as np
 
 from pipeline.calibrate.design import Predicted
 from pipeline.calibrate.estimates import Calibration, Estimate
+from pipeline.calibrate.insertions import beyond_their_priors, moved_of, stated_as_exact
 from pipeline.calibrate.unknowns import BENDING, FRICTION, REST, ROLL, TAPER, WALL, Unknown, bent, lacking, wall_factor
 from pipeline.model import Wire
 from pipeline.run.calibrated import data_of
@@ -22,6 +23,8 @@ from reports.atomic import write_text
 DEPTH = Unknown("depth_offset_mm", 0.0, 5.0, -np.inf, np.inf, 0.0, 0.25, "mm added to stated depths")
 """What is not fitted, but taken from the depths that a fit leaves."""
 MISFIT = 2.0
+IF_RIGHT = "only if all else is right, which the misfit denies: see the warnings"
+"""Beside what is seen where the wires do not meet the traces: of a shaft stated as soft as the tip a wall was 0.06."""
 ADVICE = {
     ROLL: "a tip with a curve, seen free of the wall; a frame whose tip does not touch tells the roll best",
     REST: "frames in which the tip lies free; a tip that is pressed straight shows little of its curve",
@@ -45,6 +48,8 @@ def estimates_of(found: Gathered, fit: Calibration) -> list[dict[str, Any]]:
     none = lacking(found.cases[0].wire)
     every = (*fit.estimates, _depth(found, fit))
     rows = [_row(e) | ({"why": none[e.unknown.name][0]} if e.unknown.name in none else {}) for e in every]
+    if misfit(fit):
+        rows = [row | {"why": "; ".join(filter(None, [row["why"], IF_RIGHT * row["seen"]]))} for row in rows]
     off = float(np.mean([_too_flat(voxels) for voxels in _thickness(found).values()] or [0.0]))
     return [row | {"sd": float(np.hypot(row["sd"], off))} if row["name"] == REST else row for row in rows]
 
@@ -59,7 +64,8 @@ def _depth(found: Gathered, fit: Calibration) -> Estimate:
 def _row(e: Estimate) -> dict[str, Any]:
     u = e.unknown
     row = {"name": u.name, "value": u.shown(e.value), "sd": e.sd, "logarithmic": u.logarithmic}
-    return row | {"seen": e.seen, "used": u.shown(e.used), "why": e.why}
+    at_end = f"{u.shown(e.used):g} is the end of what is possible: at most {u.shown(e.used + e.sd):.2g}, to one side"
+    return row | {"seen": e.seen, "used": u.shown(e.used), "why": e.why or at_end * (e.seen and u.one_sided(e.used))}
 
 
 def write_parameters(path: Path, found: Gathered, fit: Calibration) -> Parameters:
@@ -81,7 +87,8 @@ def write_parameters(path: Path, found: Gathered, fit: Calibration) -> Parameter
     lines += ["", "[stated]", f"bending_stiffness_N_mm2 = {_text(first.wire.bending_stiffness_N_mm2)}"]
     lines.append(f"rest_curvature_per_mm = {_text(first.wire.rest_curvature_per_mm)}")
     for stated in walls:
-        lines += ["", "[[wall]]", f"stated_N_mm2 = {_text(stated)}"]
+        # in full: a run knows a wall by it
+        lines += ["", "[[wall]]", f"stated_N_mm2 = {json.dumps(stated)}"]
         lines.append(f"stiffness_N_mm2 = {_text(stated * wall_factor(stated, values))}")
     for row in rows:
         lines += ["", "[[estimate]]", *(f"{key} = {_text(value)}" for key, value in row.items())]
@@ -111,18 +118,24 @@ def misfit(fit: Calibration) -> list[str]:
     times = float(np.sqrt(fit.scale))
     if times < MISFIT:
         return []
+    exact = [f"{name} of {', '.join(cases)} (stated as exact)" for name, cases in stated_as_exact(fit.fit).items()]
     return [
-        f"the calibrated wires lie {times:.1f} times as far from the traces as these are taken to be off: lumen, "
-        "stated rolls, the wire's profile or a trace is wrong; standard deviations are widened, values may be off "
-        "beyond them"
+        f"the calibrated wires lie {times:.1f} times as far from the traces as these are taken to be off: "
+        f"{', '.join([*exact, 'lumen'])}, stated rolls, the wire's profile or a trace is wrong; standard deviations "
+        "are widened, values may be off beyond them"
     ]
+
+
+def no_common_roll(fit: Calibration) -> list[str]:
+    """A warning where each insertion wants a roll of its own."""
+    return [f"{ROLL}: {fit.apart}"] * bool(fit.apart)
 
 
 def contradicted(fit: Calibration) -> list[str]:
     """A warning of each parameter of which the traces tell little, but more than what is stated."""
+    todo = "mend what the misfit names first" if misfit(fit) else "state it nearer to that, and calibrate again"
     return [
-        f"{e.unknown.name}: {e.why}; {e.unknown.shown(e.used):.3g} is taken with its standard deviation: state it "
-        "nearer to that, and calibrate again"
+        f"{e.unknown.name}: {e.why}; {e.unknown.shown(e.used):.3g} is taken with its standard deviation: {todo}"
         for e in fit.contradicted
     ]
 
@@ -130,7 +143,9 @@ def contradicted(fit: Calibration) -> list[str]:
 def warnings_of(found: Gathered, fit: Calibration) -> list[str]:
     """What speaks against the parameters or their standard deviations."""
     doubt = filter(None, [fit.segments.doubt])
-    return [*misfit(fit), *contradicted(fit), *flattened(found), *doubt, *found.warnings]
+    moved = beyond_their_priors(fit.fit)
+    own = [*misfit(fit), *moved, *no_common_roll(fit), *contradicted(fit)]
+    return [*own, *flattened(found), *doubt, *found.warnings]
 
 
 def segments_said(fit: Calibration) -> str:
@@ -148,6 +163,15 @@ def _together(found: Gathered) -> list[str]:
         for group, ids in cases.items()
         if len(ids) > 1
     ]
+
+
+def _walls_known(found: Gathered) -> list[str]:
+    """A note of each case that states how well its lumen is known."""
+    stated = [
+        (t.name, [f"{key} = {mm:g}" for key in ("lumen_bias_mm", "lumen_mm") if (mm := getattr(t, key)) is not None])
+        for t in found.trials
+    ]
+    return [f"{name}: the wall is known as stated: {', '.join(each)}" for name, each in stated if each]
 
 
 THINNEST_VOXELS, FLATTENING_VOXELS = 0.48, 0.9
@@ -201,13 +225,14 @@ def write_record(path: Path, found: Gathered, fit: Calibration) -> None:
         "correlation": {"names": names, "values": fit.correlation},
         "profiles": profiles,
         "frames": [vars(frame) for frame in fit.frames],
+        "insertions": [vars(one) for one in moved_of(fit.fit)],
         "starts": fit.fit.starts,
         "scale": fit.scale,
         "stated": fit.fit.problem.stated,
         "used": _used_by(found),
         "segment_mm": fit.segments.mm,
         "warnings": [*warnings_of(found, fit), *found.left_out],
-        "notes": [segments_said(fit), *_together(found), *found.notes],
+        "notes": [segments_said(fit), *_together(found), *_walls_known(found), *found.notes],
         "provenance": code_state(),
     }
     write_json(path, {"schema": 1, **record})

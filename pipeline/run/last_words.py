@@ -1,9 +1,8 @@
 """What a run says when it is done: what went wrong and what comes next, the numbers, where the report lies."""
 
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -14,7 +13,7 @@ from pipeline.run.overall import shared_scans
 from pipeline.run.provenance import command_line
 from pipeline.run.results import Result, found_results
 from pipeline.run.sweep import heads_of, lost_points
-from reports.alike import alike
+from reports.alike import alike, line_of
 from reports.case_files import counted, left_over_sentence
 from reports.doubts import copied_from_traces, warnings_in
 from reports.origin import why_not_pooled
@@ -35,7 +34,7 @@ def failure_lines(plan: Plan, then: str = "") -> list[str]:
     lines = [*filter(None, [why_not_pooled(plan.out)]), *shared_scans(found)]
     for result in found:
         cases += [row["case"] for row in result.failures]
-        lines += map(_failure, alike(result.failures))
+        lines += map(line_of, alike(result.failures))
     heads = heads_of(plan.template.settings, plan.cases, plan.points)
     lines += lost_lines(lost_points(plan.out, heads))
     lines += silent_points(read_if_there(plan.out / SWEEP.file, SWEEP))
@@ -48,14 +47,6 @@ def failure_lines(plan: Plan, then: str = "") -> list[str]:
 def lost_lines(lost: Sequence[tuple[Path, Result]]) -> list[str]:
     """What a sweep has lost, a line each."""
     return [f"{folder}: {result.case}: {result.status}: {result.failures[0]['message']}" for folder, result in lost]
-
-
-def _failure(row: Mapping[str, Any]) -> str:
-    """One line for all frames that failed alike."""
-    of = f" {row['of']}" * bool(row["of"])
-    said = f"in frame {row['frame']}: {row['message']}" if row["count"] > 1 and row["message"] else row["message"]
-    files = f"{row['files']}; " * bool(row["files"])
-    return f"{row['case']}{of}: {row['status']}: {files}{said or row['sentence']}"
 
 
 def _next(plan: Plan, cases: Sequence[str]) -> str:

@@ -24,6 +24,12 @@ Progress = Callable[[str, int, int, str], None]
 """Called with stage, steps done, steps in all, and a short text."""
 
 
+def early_end(until: Stage) -> str:
+    """The sentence of what is ok where a run was to end before frames are compared; else empty."""
+    whole = STAGES.index(until) >= STAGES.index("compare")
+    return "" if whole else f"nothing failed up to where the run was to end (--until {until})"
+
+
 @dataclass
 class Log:
     """Times and numbers by stage. seconds : of the whole case; frame_seconds : by (frame, stage).

@@ -15,7 +15,7 @@ from pipeline.register.frames import record
 from pipeline.run import ledger
 from pipeline.run.calibrated import data_of
 from pipeline.run.inputs import contents_of, described, stated
-from pipeline.run.log import Log
+from pipeline.run.log import Log, early_end
 from pipeline.run.occupied import owner_of
 from pipeline.run.outputs import failure_rows, message_of
 from pipeline.run.stages import Known
@@ -183,13 +183,19 @@ def names_of(case: Case, known: Known) -> tuple[str, ...]:
 
 def result_of(case: Case, known: Known, summary: dict[str, Any], key: str, details: dict[str, Any]) -> Result:
     """The result of a case that went through the stages."""
+    early = early_end(details["until"])
     frames = [
-        {"status": f.status, "sentence": f.sentence, "stage": f.stage, "message": message_of(f, known)}
+        {
+            "status": f.status,
+            "sentence": (f.ok and early) or f.sentence,
+            "stage": f.stage,
+            "message": message_of(f, known),
+        }
         | {"frame": f.index, "registration": record(f.registration), "trace": _marked(f)}
         | _events(f)
         for f in known.frames
     ]
-    good = "every frame has a result" if case.compared else FrameStatus.SIMULATED.value
+    good = early or ("every frame has a result" if case.compared else FrameStatus.SIMULATED.value)
     worst = next((f.sentence for f in known.frames if not f.ok), good)
     sentence = str(known.failure) if known.failure else worst
     head = (case.id, case.role, case.group, summary["status"], sentence)

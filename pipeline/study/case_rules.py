@@ -34,7 +34,8 @@ def borrowing_problems(cases: Mapping[str, tuple[str, bool]]) -> list[str]:
     for case, (entry, _) in cases.items():
         name, others = entry.removeprefix("case:"), [other for other in cases if other != case]
         if name and name not in cases:
-            problems.append(f"case {case!r}: entry = {entry!r}: no such case; {did_you_mean(name, others)}")
+            todo = did_you_mean(name, others) if others else "this is the only case: leave entry out"
+            problems.append(f"case {case!r}: entry = {entry!r}: no such case; {todo}")
         elif name and (cases[name][0] or not cases[name][1]):
             what = "name one with frames of its own and no entry of another"
             problems.append(f"case {case!r}: entry = {entry!r} shows no clamp; {what}")

@@ -63,7 +63,7 @@ def _not_written(value: Any, info: ValidationInfo) -> None:
 
 ONE_OF_THEM: JsonDict = {"type": "string", "$comment": "the name of one of [wires.*], in quotes"}
 FILLED_IN = BeforeValidator(_not_written), WithJsonSchema(WRITTEN_HERE)
-IDS: JsonDict = {"$comment": f"up to {LONGEST_NAME} letters, digits and . _ -, a letter or a digit first"}
+IDS: JsonDict = {"$comment": f"up to {LONGEST_NAME} of A-Z, a-z, 0-9 and . _ -, a letter or a digit first"}
 ANOTHER: JsonDict = {"$comment": '"case:ID", with the id of another case'}
 LEAST_ACROSS_DEG = 5.0
 """Between material_axis and entry_direction: more than a clamp's direction is found to be off by."""

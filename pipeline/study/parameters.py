@@ -6,6 +6,7 @@ nothing about the model, and is not scored unless that is asked for.
 
 from collections.abc import Sequence
 from dataclasses import replace
+from math import isclose
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -31,6 +32,14 @@ from pipeline.wording import said, sentences
 if TYPE_CHECKING:
     from pipeline.model import Wire
     from pipeline.study.manifest import Case
+
+SAME = 1e-4
+"""Relative difference up to which two stated numbers are one: a file may leave out digits."""
+
+
+def same_wall(one_N_mm2: float, other_N_mm2: float) -> bool:
+    """Whether two stated stiffnesses are those of one wall."""
+    return isclose(one_N_mm2, other_N_mm2, rel_tol=SAME)
 
 
 class WallFound(Strict):
@@ -62,7 +71,7 @@ class Stated(Strict):
         """Whether a manifest still states it so, but for digits that the file leaves out."""
         pairs = ((getattr(self, name), getattr(wire, name)) for name in type(self).model_fields)
         arrays = ((np.asarray(a, float), np.asarray(b, float)) for a, b in pairs)
-        return all(a.shape == b.shape and np.allclose(a, b, rtol=1e-4, atol=1e-9) for a, b in arrays)
+        return all(a.shape == b.shape and np.allclose(a, b, rtol=SAME, atol=1e-9) for a, b in arrays)
 
 
 class Used(Strict):
@@ -93,6 +102,10 @@ class Parameters(Strict):
     stated: Stated | None = None
     estimate: tuple[Found, ...] = ()
     used: tuple[Used, ...] = ()
+
+    def wall_of(self, stated_N_mm2: float) -> WallFound | None:
+        """The wall that a manifest states so; None where none was calibrated."""
+        return next((one for one in self.wall if same_wall(one.stated_N_mm2, stated_N_mm2)), None)
 
     @property
     def unseen(self) -> list[str]:
@@ -135,12 +148,13 @@ def with_parameters(case: "Case", found: Parameters, data: Sequence[str], *, sco
         what = f"case {case.id!r}: wire {found.wire!r} is stated otherwise than when it was calibrated (table stated)"
         raise ParametersError([f"{what}; state it as then, give it another name, or calibrate it again"])
     profiles = {name: getattr(found, name) for name in ("bending_stiffness_N_mm2", "rest_curvature_per_mm")}
-    stiffness = {w.stated_N_mm2: w.stiffness_N_mm2 for w in found.wall}.get(case.wall.stiffness_N_mm2)
+    wall = found.wall_of(case.wall.stiffness_N_mm2)
+    stiffness = case.wall.stiffness_N_mm2 if wall is None else wall.stiffness_N_mm2
     friction = case.wall.friction if "friction" in found.unseen else found.friction
     changes: dict[str, Any] = {
         "wire": replace(case.wire, **profiles),
-        "wall": replace(case.wall, stiffness_N_mm2=stiffness or case.wall.stiffness_N_mm2, friction=friction),
-        "calibrated": _told(case, found, known_wall=stiffness is not None),
+        "wall": replace(case.wall, stiffness_N_mm2=stiffness, friction=friction),
+        "calibrated": _told(case, found, known_wall=wall is not None),
         "calibrated_sigma": _sigmas(case, found),
         "calibrated_scans": () if score_used else tuple(scan for used in found.used for scan in used.data),
         "calibrated_traces": () if score_used else tuple(trace for used in found.used for trace in used.traced_mm),
@@ -174,7 +188,8 @@ def _sigmas(case: "Case", found: Parameters) -> dict[str, float]:
     The taper is not among them: it is a factor on the shaft's stiffness there, on lengths in the budget.
     """
     keys = {name: name for name in ("rest_curvature", "friction")} | {"depth_offset_mm": "insertion_mm"}
-    keys |= {f"wall:{case.wall.stiffness_N_mm2:g}": "wall_stiffness"}
+    wall = found.wall_of(case.wall.stiffness_N_mm2)
+    keys |= {} if wall is None else {f"wall:{wall.stated_N_mm2:g}": "wall_stiffness"}
     keys |= {"roll_offset_deg": "roll_deg"} if case.roll_deg != "fit" else {}
     return {keys[one.name]: one.sd for one in found.estimate if one.seen and one.name in keys}
 

@@ -62,7 +62,10 @@ class Results:
 
     @property
     def ok(self) -> bool:
-        """Whether every case has a whole result, all frames of it ok, of the same settings, and no gate is closed."""
+        """Whether every case has a whole result, all frames of it ok, of the same settings, and no gate is closed.
+
+        With ``until`` a frame is ok where nothing failed so far, compared or not.
+        """
         if (
             self.closed
             or self.damaged

@@ -23,7 +23,7 @@ def parameters() -> Numbers:
 
 def calibrated() -> Numbers:
     """The fit to one insertion of three frames."""
-    return _found("calibration.json", ("estimates", "correlation", "profiles", "frames", "scale"))
+    return _found("calibration.json", ("estimates", "correlation", "profiles", "frames", "insertions", "scale"))
 
 
 def designed() -> Numbers:

@@ -20,9 +20,10 @@ from pipeline.calibrate import estimates, segments
 from pipeline.calibrate.design import predicted, straight_to
 from pipeline.calibrate.estimates import Estimate, _followed, _judged, calibrated
 from pipeline.calibrate.fit import Problem
+from pipeline.calibrate.insertions import beyond_their_priors, moved_of
 from pipeline.calibrate.residuals import Evidence, weights_of
 from pipeline.calibrate.search import Fit, fitted, own_roll, roll_fitted
-from pipeline.calibrate.trials import OWN, Point, Trial, replayed
+from pipeline.calibrate.trials import OWN, WALL_OFFSET, Point, Trial, replayed
 from pipeline.calibrate.unknowns import BENDING, FRICTION, REST, ROLL, TAPER, bent, lacking, spread_in_words, unknowns
 from pipeline.cli import main
 from pipeline.compare.pooled import is_pooled
@@ -32,7 +33,7 @@ from pipeline.run.cache import Store
 from pipeline.run.calibrated import as_calibrated, data_of
 from pipeline.run.calibrated_wire import wire_rows
 from pipeline.run.calibration import SAME_MM, CalibrationError, depth_offset, design, gathered, over_insertions
-from pipeline.run.calibration_files import contradicted, estimates_of, flattened, misfit
+from pipeline.run.calibration_files import _walls_known, contradicted, estimates_of, flattened, misfit, no_common_roll
 from pipeline.run.inputs import described, other_file, stated, times_of
 from pipeline.run.log import Log
 from pipeline.run.outputs import error_row, summary_row
@@ -108,6 +109,7 @@ def test_rolls_that_are_stated_wrongly_have_no_common_offset(stated_deg, apart):
     assert ("b wants 12 degrees more than a" in roll.why) is apart
     assert roll.used == (0.0 if apart else pytest.approx(17.0, abs=1.0))
     assert {frame.turned for frame in found.frames} == {"as_calibrated" if apart else ""}
+    assert bool(no_common_roll(found)) is apart, "it stood in the parameter's row alone"
 
 
 @pytest.mark.parametrize("off_deg", [9.0, pytest.param(20.0, marks=pytest.mark.slow)])
@@ -270,8 +272,11 @@ def test_what_the_traces_contradict_does_not_stay_as_stated(monkeypatch, times):
     monkeypatch.setattr(calibration, "all_unknowns", lambda _: all_of(one))
     found: Any = SimpleNamespace(cases=(), trials=(one,))
     if times > 10.0:  # a factor on it is at least 1 in 5
-        with pytest.raises(CalibrationError, match=r"taper: the traces contradict .* end of its range, 0.2: nothing"):
+        with pytest.raises(
+            CalibrationError, match=r"taper: the traces contradict .* end of its range, 0.2: nothing"
+        ) as e:
             calibration.calibrate(found, SimpleNamespace(solver=SETTINGS))  # type: ignore[arg-type]
+        assert str(e.value).count("the end of its range") == 1, "it was said twice"
         return
     fit = calibration.calibrate(found, SimpleNamespace(solver=SETTINGS))  # type: ignore[arg-type]
     by_name = {e.unknown.name: e for e in fit.estimates}
@@ -440,6 +445,94 @@ def test_a_misfit_is_told():
     assert "lumen, stated rolls" in misfit(replace(fit, scale=9.0))[0]
 
 
+def test_a_misfit_names_what_is_stated_as_exact(at_truth):
+    """A direction 5 degrees off, stated as exact, made a taper of 0.71 +- 4 %; lumen, rolls and profile were named."""
+    problem = at_truth.problem
+    held = Evidence(replace(problem.evidence[0].trial, prior=Prior(0.1, 0.0), roll_sigma_deg=5.0))
+    fit: Any = SimpleNamespace(fit=replace(at_truth, problem=replace(problem, evidence=(held,))), scale=9.0)
+    assert "to be off: entry_direction of t (stated as exact), lumen, stated rolls" in misfit(fit)[0]
+    fit.fit = at_truth
+    assert "to be off: roll_deg of t (stated as exact), lumen, stated rolls" in misfit(fit)[0]
+
+
+def test_what_is_seen_under_a_misfit_says_so_and_what_ends_at_its_bound(monkeypatch, at_truth):
+    """With the wire's profile stated wrongly a wall of 0.06 was "seen"; friction was "0.0000 +- 0.0092"."""
+    monkeypatch.setattr(calibration_files, "depth_offset", lambda *_: (0.0, np.nan))
+    unknown = {u.name: u for u in unknowns([], 0.0, weighed=False)}
+    rows = [Estimate(unknown[TAPER], 0.0, 0.5, 0.0, False, "little is known", ())]
+    rows.append(Estimate(unknown[FRICTION], 0.0, 0.0092, 0.0, True, "", ()))
+    fit: Any = SimpleNamespace(estimates=rows, scale=1.0, fit=at_truth)
+    assert [row["why"] for row in estimates_of(of_voxels(0.3), fit)][:2] == [
+        "little is known",
+        "0 is the end of what is possible: at most 0.0092, to one side",
+    ]
+    fit.scale = 9.0
+    found = estimates_of(of_voxels(0.3), fit)
+    assert found[0]["why"] == "little is known"
+    assert "to one side; only if all else is right" in found[1]["why"]
+
+
+def with_wall_moved(fit: Fit, mm: float) -> Fit:
+    """A fit that moved the wall of its insertion."""
+    wall = np.arange(len(fit.linear.x)) == fit.problem.parts[0][WALL_OFFSET]
+    return replace(fit, linear=replace(fit.linear, x=np.where(wall, mm, fit.linear.x)))
+
+
+def test_an_insertion_far_from_what_is_stated_is_told(at_truth):
+    """A lumen 10 % too narrow: the walls were moved by 3.1 of their prior's deviations, and nothing said so."""
+    assert beyond_their_priors(at_truth) == []
+    (told,) = beyond_their_priors(with_wall_moved(at_truth, -0.14))
+    assert told.startswith(
+        "the walls of t were moved by -0.14 mm (prior 0 +- 0.045): the lumen may be so much too narrow"
+    )
+    assert "too wide, or radius_mm too small" in beyond_their_priors(with_wall_moved(at_truth, 0.14))[0]
+    moved = moved_of(with_wall_moved(at_truth, -0.14))
+    assert [one.value for one in moved] == pytest.approx([0.0] * 5 + [-0.14, 0.0])
+    assert [one.prior_sd for one in moved] == pytest.approx([0.1] * 3 + [1.0] * 2 + [0.045, 0.0])
+    assert all(0.0 < one.sd <= one.prior_sd for one in moved[:-1])
+
+
+def test_insertions_that_agree_on_another_lumen_are_told_together(at_truth):
+    pair = [Evidence(replace(at_truth.problem.evidence[0].trial, name=name, group=name)) for name in "ab"]
+    problem = replace(at_truth.problem, evidence=tuple(pair))
+    x = np.zeros(len(problem.prior[0]))
+    for part in problem.parts:
+        x[part[WALL_OFFSET]] = -0.15
+    linear: Any = SimpleNamespace(x=x, covariance=np.eye(len(x)))
+    (told,) = beyond_their_priors(Fit(problem, linear, ()))
+    assert "the walls of a, b were moved by -0.15, -0.15 mm" in told
+    assert "all insertions agree: the lumen" in told
+
+
+def test_how_far_the_wires_lie_with_the_walls_as_they_are_given(at_truth):
+    """0.045 mm "as calibrated" was 0.13 to 0.16 mm in a run, which has the walls of the manifest."""
+    for mm, worse in ((0.0, False), (-0.14, True)):
+        (frame, *_) = estimates._errors(with_wall_moved(at_truth, mm), at_truth.problem.evidence)
+        assert bool(abs(frame.as_given_mm - frame.after_mm) > 0.01) is worse
+
+
+def test_the_wall_is_known_as_well_as_the_manifest_states(study):
+    """A stated lumen_bias_mm was ignored: the prior stayed 0.15 voxel."""
+    text = (study / "manifest.toml").read_text(encoding="utf-8")
+    unsure = "roll_deg = 5.0\n[case.uncertainty]\nlumen_bias_mm = 0.3\nlumen_mm = 0.2"
+    (study / "manifest.toml").write_text(text.replace("roll_deg = 5.0", unsure), encoding="utf-8")
+    found = gathered(read_manifest(study / "manifest.toml").cases[:1], Config(), Store(None), lambda _: None)
+    (one,) = found.trials
+    assert one.sigmas[WALL_OFFSET] == 0.3
+    assert np.diag(Evidence(one).modelled).min() == pytest.approx(0.2**2, rel=0.5)
+    assert _walls_known(found) == ["a: the wall is known as stated: lumen_bias_mm = 0.3, lumen_mm = 0.2"]
+
+
+def test_a_frame_that_is_not_fitted_is_named(study):
+    """Of a depth stated 5 mm off: "8 of 9 frames are fitted", neither which nor why."""
+    text = (study / "manifest.toml").read_text(encoding="utf-8").replace("8.0, 10.0, 12.0", "8.0, 10.0, 12.0, 30.0")
+    text = text.replace('"2.csv"', '"2.csv", "3.csv"')
+    (study / "manifest.toml").write_text(text, encoding="utf-8")
+    found = gathered(read_manifest(study / "manifest.toml").cases[:1], Config(), Store(None), lambda _: None)
+    (told,) = found.warnings
+    assert told.startswith("not fitted: a frame 3: length_mismatch: ")
+
+
 def test_the_roll_of_one_frame_is_found_from_anywhere():
     for true in (-150.0, 10.0, 120.0):
         one = trial(values=TRUE | {ROLL: 0.0}, depths=(14.0,))
@@ -551,11 +644,36 @@ def test_the_budget_is_told_how_well_what_was_seen_is_known(study):
         for name, seen in (("wall:7", "true"), ("friction", "false"), ("wall:2", "true"))
     )
     text = (study / "p.toml").read_text(encoding="utf-8")
+    rows += "[[wall]]\nstated_N_mm2 = 7.0\nstiffness_N_mm2 = 7.0\n"
     (study / "p.toml").write_text(text.replace("[[used]]", f"{rows}[[used]]"), encoding="utf-8")
     (case,), _ = as_calibrated(read_manifest(study / "manifest.toml").cases, study / "p.toml")
     assert case.calibrated_sigma == {"rest_curvature": 0.01, "wall_stiffness": 0.1}, (
         "its own wall; nothing of the taper"
     )
+
+
+@pytest.mark.parametrize("stated", ["7.000000001", "7.0001", "6.9999"])
+def test_a_wall_is_known_by_what_the_manifest_states_but_for_its_last_digits(study, stated):
+    """Stated at 0.03333333333 it was as stated, without a word: a factor of 21, and rms 0.166 mm for 0.050."""
+    rows = '[[estimate]]\nname = "wall:7"\nvalue = 1.0\nsd = 0.1\nlogarithmic = true\nseen = true\nused = 1.0\n'
+    text = (study / "p.toml").read_text(encoding="utf-8").replace("stated_N_mm2 = 2.0", "stated_N_mm2 = 7.0")
+    (study / "p.toml").write_text(text.replace("[[used]]", f"{rows}[[used]]"), encoding="utf-8")
+    manifest = study / "manifest.toml"
+    manifest.write_text(manifest.read_text(encoding="utf-8").replace("7.0", stated), encoding="utf-8")
+    (case,), _ = as_calibrated(read_manifest(manifest).cases, study / "p.toml")
+    assert case.wall.stiffness_N_mm2 == 1.5
+    assert case.calibrated_sigma["wall_stiffness"] == 0.1
+    assert "no wall stated" not in case.calibrated
+
+
+def test_walls_that_nothing_tells_apart_are_refused_before_the_fit(study, capsys):
+    """2.0 and 2.0000001 were two walls of one name, and ended in a traceback after the fit."""
+    manifest = study / "manifest.toml"
+    text = manifest.read_text(encoding="utf-8").replace('id = "b"', 'id = "b"\nrole = "calibration"')
+    text = text.replace("roll_deg = 5.0", "roll_deg = 5.0\n[case.wall]\nstiffness_N_mm2 = 7.0000001")
+    manifest.write_text(text, encoding="utf-8")
+    assert main(["calibrate", str(manifest), "-o", str(study / "out")]) == 2
+    assert "state walls of 7.0 and 7.0000001 N/mm2, which nothing tells apart; state one" in capsys.readouterr().err
 
 
 def test_a_friction_that_was_not_seen_stays_as_the_case_states_it(study):
@@ -898,7 +1016,7 @@ def test_what_a_thin_wire_is_flattened_by_is_in_the_standard_deviation(monkeypat
     monkeypatch.setattr(calibration_files, "depth_offset", lambda *_: (0.0, np.nan))
     unknown = {u.name: u for u in unknowns([], 0.0, weighed=False)}
     rows = [Estimate(unknown[name], 0.0, 0.02, 0.0, True, "", ()) for name in (REST, TAPER)]
-    fit: Any = SimpleNamespace(estimates=rows)
+    fit: Any = SimpleNamespace(estimates=rows, scale=1.0)
     for voxel_mm, sd in ((0.375, 0.02), (0.75, np.hypot(0.02, 0.09)), (0.5, np.hypot(0.02, 0.02))):
         rest, taper, _ = estimates_of(of_voxels(voxel_mm), fit)
         assert rest["sd"] == pytest.approx(sd, rel=0.01)
@@ -924,3 +1042,5 @@ def test_how_well_a_factor_is_known_is_said_in_per_cent_or_as_a_factor() -> None
     assert spread_in_words(0.2951, logarithmic=True) == "30 %"
     assert spread_in_words(1.4, logarithmic=True) == "a factor of 4.1"
     assert spread_in_words(1234.5, logarithmic=False) == "1234"  # it was 1e+03
+    profile = ((0.0, 9432.0),)
+    assert "the objective is higher by 9432;" in _judged(free[TAPER], fit, profile).why  # it was 9.4e+03

@@ -148,7 +148,7 @@ def test_a_polydata_file_holds_what_it_says(tmp_path: Path, text: str, said: str
         (POINTS.reshape(9, 2).tolist(), "defined", "not three numbers"),
         ([[str(value) for value in point] for point in POINTS.tolist()], "defined", "not three numbers"),
         ([[True, 0.5, 1], [0, 0, 5.5]], "defined", "not three numbers"),
-        (POINTS.tolist(), "undefined", "6 control points that are not placed, the first is 0"),
+        (POINTS.tolist(), "undefined", "6 control points that are not placed, the first is point 0"),
     ],
 )
 def test_control_points_are_placed_and_have_three_numbers(

@@ -88,6 +88,16 @@ def test_a_wrong_zero_of_the_ruler_is_told_of_three_frames() -> None:
     assert not elsewhere([*(DEPTHS[:3] + 20.0 * read - 1.2)], DEPTHS[:3]), "read to 0.5 mm, three are so by chance"
 
 
+def test_lengths_that_are_left_outside_are_told_as_such() -> None:
+    """100 mm less what is in: "grow -1.000 times as fast: is the scans' voxel size right", or a reversed direction."""
+    outside = [110.0 - d for d in DEPTHS]
+    seen = [f.failed("trace", FrameStatus.LENGTH_MISMATCH, "too short") for f in frames(DEPTHS, outside)]
+    assert perhaps_turned(seen)[0].message.startswith("too short; are these the lengths left outside (ins")
+    seen = frames(DEPTHS, outside)
+    (said,) = on_another_scale(seen, from_entry(seen))
+    assert said.startswith("the traced wires get longer where insertion_mm states less: are these the lengths left")
+
+
 def test_a_zero_is_as_well_known_as_the_entry_and_the_ruler_are() -> None:
     seen = frames([d - 0.9 for d in DEPTHS], DEPTHS)
     for common_mm, read_mm, told in ((0.17, None, 1), (0.17, 0.1, 1), (0.3, None, 0), (0.17, 1.0, 0)):

@@ -22,6 +22,7 @@ from pipeline.study.devices import implausible
 from pipeline.study.manifest import ManifestError, read_manifest
 from pipeline.study.plausible import (
     among,
+    entry_in_metres,
     in_case,
     loose_entry,
     lost_header,
@@ -198,8 +199,41 @@ SECOND = GOOD.split("[[case]]")[1].replace("run1", "run2")
 
 def test_a_table_of_a_case_at_the_top_is_told_where_it_belongs(tmp_path: Path) -> None:
     said = problems(tmp_path, f"{GOOD}[wall]\nstiffness_N_mm2 = 2.0\n")
-    assert "wall: unknown key; it belongs to a case: write it below its [[case]], a table as [case.wall]" in said
+    assert "wall: unknown key; it is a key of [[case]]: write [case.wall]" in said
     assert "walls: unknown key; allowed: case, schema, wires" in problems(tmp_path, f"{GOOD}[walls]\n")
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        (
+            f"{GOOD}friction = 0.1\n",
+            "case 'run1' friction: unknown key; it is a key of [case.wall] or [case.uncertainty]: write it there",
+        ),
+        (
+            f'{GOOD}[case.wall]\ntruth = "truth.json"\n',
+            "case 'run1' wall truth: unknown key; it is a key of [[case]]: write it above [case.wall]",
+        ),
+        (f"{GOOD}opacity = 2.0\n", "opacity: unknown key; it is a key of [wires.NAME]: write it there"),
+        (f'reference = "r.mha"\n{GOOD}', "reference: unknown key; it is a key of [[case]]: write it there"),
+        (f"{GOOD}[wire.wire]\nradius_mm = 0.2\n", "wire: unknown key; did you mean 'wires'?"),
+        (f'{GOOD}entry = "case:other"\n', "no such case; this is the only case: leave entry out"),
+        (GOOD.replace("run1", "für"), "expected up to 100 of A-Z, a-z, 0-9 and . _ -"),
+        (GOOD.replace("radius_mm = 0.18", "radius_mm = 0,18"), "decimals with a point: 0.18"),
+    ],
+)
+def test_a_key_of_another_table_is_told_with_that_table(tmp_path: Path, text: str, told: str) -> None:
+    """friction in [[case]]: "did you mean 'projections'?"; truth below [case.wall]: "allowed: friction, stiffness"."""
+    assert told in problems(tmp_path, text)
+
+
+def test_an_entry_in_metres_is_asked_about(tmp_path: Path) -> None:
+    """Of an entry 8 mm from the origin, written in metres, check found nothing."""
+    text = GOOD.replace("[1.0, 2.0, 3.0]", "[0.000012, -0.000137, -0.00794]")
+    (case,) = read_manifest(written(tmp_path, text)).cases
+    (told,) = entry_in_metres(case)
+    assert told == "entry_mm lies within 0.05 mm of 0, 0, 0: is it in metres ([0.012, -0.137, -7.94] mm)?"
+    assert entry_in_metres(case.model_copy(update={"entry_mm": (0.0, 0.0, 0.0)})) == []
 
 
 def test_a_clamp_is_borrowed_from_another_case(tmp_path: Path) -> None:

@@ -409,6 +409,10 @@ def test_nothing_of_an_earlier_run_stays_beside_a_new_result(
     assert "Nothing is scored: the run was" in (out / "index.html").read_text(encoding="utf-8")
     assert pd.read_csv(out / "summary.csv")["within_1mm"].isna().all(), "it was 1"
     assert json.loads((out / "run.json").read_text(encoding="utf-8"))["overall"] == {}
+    early = "nothing failed up to where the run was to end (--until trace)"
+    case = result_of(out)
+    assert case["sentence"] == early, "it was: every frame has a result"
+    assert {(f["status"], f["sentence"]) for f in case["frames"]} == {("ok", early)}, "it was: simulated and compared"
     left = {p.name for p in (out / "cases" / "bifurcation").iterdir()}
     assert not left & {"points.csv.gz", "report.html", "figures", "scene3d.html"}
     assert not list((out / "cases" / "bifurcation" / "view").glob("wire_simulated*"))

@@ -255,7 +255,7 @@ def nan(wire: Array) -> Array:
 @pytest.mark.parametrize(
     ("spoil", "said"),
     [
-        (nan, "1 of 82 points are NaN or infinite, the first is 3"),
+        (nan, "1 of 82 points are NaN or infinite, the first is point 3"),
         (lambda wire: wire[:1], "1 different points"),
         (lambda wire: np.repeat(wire[:1], 5, axis=0), "1 different points"),
         (lambda wire: wire[:, :2], "x_mm"),
@@ -527,7 +527,10 @@ def test_bad_frames_fail_and_the_others_count(known: Known, tmp_path: Path) -> N
     assert code == 1, "one unreadable file refused all of them"
     assert list(table["status"]) == ["ok", *["curve_unusable"] * 3]
     said = [failure["message"] for failure in json.loads(json.dumps(result["failures"]))]
-    assert "wire_001.csv: has columns a, b; expected x_mm, y_mm, z_mm (or x, y, z), separated by commas" in said[0]
+    assert (
+        "wire_001.csv: has columns a, b; expected x_mm, y_mm, z_mm (or x, y, z), separated by commas or semicolons"
+        in said[0]
+    )
     assert "wire_002.csv: space and unit are not stated" in said[1]
     assert r"wire_003.csv: has columns '\x00\x01\x02'; expected" in said[2], "nothing that a terminal would obey"
 

@@ -67,13 +67,18 @@ def _calibration(folder: Path) -> Path:
     told |= {"prior": 1.0, "bounds": [0.01, 100.0], "logarithmic": True}
     estimates = [{"name": n, "value": 1.1, "sd": s, "seen": s < 1, **told} for n, s in (("taper", 0.1), ("wall", 1.5))]
     profile = [[0.5, 8.0], [0.9, 2.0], [1.4, 2.0], [4.0, 9.0]]
-    frame = {"case": "a", "before_mm": 0.2, "after_mm": 0.1, "weight": 1.0, "turned": "in_both"}
+    frame = {"case": "a", "before_mm": 0.2, "after_mm": 0.1, "as_given_mm": 0.15, "weight": 1.0}
+    frame["turned"] = "in_both"
     frames = [{"depth_mm": 10.0, "frame": n, **frame} for n in range(4)]
     record = {
         "estimates": estimates,
         "correlation": {"names": ["taper", "wall"], "values": np.eye(2).tolist()},
         "profiles": {"taper": profile, "wall": profile},
         "frames": frames,
+        "insertions": [
+            {"insertion": "a", "of": "wall_mm", "how": "to the wall", "value": -0.14, "sd": 0.012, "prior_sd": 0.045},
+            {"insertion": "a", "of": "roll_deg", "how": "turned", "value": 0.0, "sd": 0.0, "prior_sd": 0.0},
+        ],
         "starts": [[0.5, 57.0]],
         "scale": 1.0,
         "used": [{"case": "a", "group": "a"}],

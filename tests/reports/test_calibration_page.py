@@ -32,5 +32,19 @@ def test_variances_are_only_compared_with_those_that_are_stated(
     assert said in text
     assert unsaid not in text
     assert "mm as calibrated, each insertion turned for itself in both" in text
-    assert "clamps fitted to both, each insertion turned for itself in both: a run as stated turns none" in text
+    assert (
+        "clamps and walls fitted to both, each insertion turned for itself in both: a run as stated turns none" in text
+    )
     assert "turned for itself as calibrated" not in text
+
+
+def test_what_each_insertion_was_moved_by_is_told(tmp_path: Path) -> None:
+    """Walls moved by 0.14 mm were in no file, and "as calibrated" did not say that walls were fitted."""
+    fake_pages._calibration(tmp_path / "out")
+    text = (tmp_path / "out" / "calibration.html").read_text(encoding="utf-8")
+    assert "clamps and walls are fitted to both; with the walls as they are given it is 0.150 mm" in text
+    table = text.partition('id="moved"')[2].partition("</table>")[0]
+    assert table.count('class="bad"') == 1
+    assert "-0.140" in table
+    assert "exact" in table
+    assert "<code>taper</code>: known to 1.5 only." in text, "a reservation of what is taken"

@@ -149,9 +149,12 @@ def test_a_calibration_that_gains_nothing_says_so() -> None:
     frames = [{"depth_mm": mm, "before_mm": rms, "after_mm": rms} for mm, rms in ((10.0, 0.05), (30.0, 0.1))]
     said = gained(frames)
     assert said.startswith("the wires of 2 fitted frames lie 0.0901 mm rms from their traces as stated, 0.0901 mm")
-    assert said.endswith("0.0901 mm as calibrated: no nearer")
-    assert gained([row | {"after_mm": 0.3} for row in frames]).endswith("0.300 mm as calibrated: farther away")
-    assert gained([row | {"after_mm": 0.02} for row in frames]).endswith("0.0200 mm as calibrated")
+    both = "; clamps and walls are fitted to both"
+    assert said.endswith(f"0.0901 mm as calibrated: no nearer{both}")
+    assert gained([row | {"after_mm": 0.3} for row in frames]).endswith(f"0.300 mm as calibrated: farther away{both}")
+    assert gained([row | {"after_mm": 0.02} for row in frames]).endswith(f"0.0200 mm as calibrated{both}")
+    given = [row | {"as_given_mm": 0.3} for row in frames]
+    assert gained(given).endswith(f"{both}; with the walls as they are given it is 0.300 mm")
     for where, words in (("in_both", ", each insertion turned for itself in both"), ("as_calibrated", " with each")):
         assert f"0.0901 mm as calibrated{words}" in gained([row | {"turned": where} for row in frames])
     assert gained([]) == gained([{"depth_mm": 10.0, "before_mm": None, "after_mm": 0.1}]) == ""

@@ -245,7 +245,8 @@ def statuses() -> str:
     parts = [
         "# Statuses\n",
         NOTE,
-        "A frame is `ok` only if it was traced, simulated to its depth, converged and compared.\n",
+        "A frame is `ok` only if it was traced, simulated to its depth, converged and compared. Where a run was to end "
+        "before that (`--until`), `ok` says that nothing failed so far; its sentence in result.json says so.\n",
     ]
     for title, pairs in (
         ("Of a frame", [(one.identifier, one.value) for one in FrameStatus]),

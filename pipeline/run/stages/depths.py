@@ -45,6 +45,10 @@ BENT, BY_CHANCE = 0.5, 0.01
 """Share of the mean scale by which scales at the first and the last depth must differ to be no one scale (of what grows
 as the square of the depth by 1 to 2, of a wrong voxel size by nothing), and how often that may be chance: of wrong
 voxel sizes 9 of 1700 were told so."""
+NEAR_ONE = 0.2
+"""How near to -1 a slope of traced lengths over stated depths is that of lengths left outside."""
+OUTSIDE = "are these the lengths left outside (insertion_mm is beyond entry_mm), or are frames in opposite order?"
+TURNED = "or entry_direction points back along the wire: turn it round"
 LEAST_MM, OF_MEDIAN = 0.5, 1.25
 """By how much the zero of depths must be off to be told, and a median's standard deviation over a mean's."""
 
@@ -173,6 +177,8 @@ def on_another_scale(frames: Sequence[Frame], depths_mm: Mapping[int, float]) ->
         if len(stated) <= FEWEST or left * CLEARLY > if_zero or not _scale_told(slope, deviation, len(stated) - 1):
             return []
         zero = f"; {left:.2f} mm rms are left, {if_zero:.2f} if all were counted from elsewhere"
+    if _runs_down(stated, traced):
+        return [f"the traced wires get longer where insertion_mm states less: {OUTSIDE}"]
     if bent := _on_no_one_scale(stated, traced - stated):
         return [bent]
     return [
@@ -180,6 +186,12 @@ def on_another_scale(frames: Sequence[Frame], depths_mm: Mapping[int, float]) ->
         f"{deviation:.2g}, {len(stated)} stated depths{zero}): is the scans' voxel size right, or the scale that "
         "depths were read from? With a wrong size all lengths and errors are as wrong"
     ]
+
+
+def _runs_down(stated: Array, traced: Array) -> bool:
+    """Whether traced lengths (n,) fall by as much as stated depths (n,) grow: no scale does that."""
+    known = len(stated) >= FEWEST_ALIKE and np.ptp(stated) > 0.0
+    return bool(known and abs(np.polyfit(stated, traced, 1)[0] + 1.0) < NEAR_ONE)
 
 
 def _on_no_one_scale(stated: Array, apart: Array) -> str:
@@ -211,9 +223,11 @@ def perhaps_turned(frames: Sequence[Frame]) -> list[Frame]:
     """The frames; one that is refused for its length, and whose trace has hardly begun, may run the wrong way."""
     out = list(frames)
     wrong = FrameStatus.LENGTH_MISMATCH.identifier
+    known = [(f.expected_mm, f.curve.length_mm) for f in frames if f.curve is not None and np.isfinite(f.expected_mm)]
+    why = OUTSIDE if _runs_down(*np.array(known).reshape(-1, 2).T) else TURNED
     for n, f in enumerate(frames):
         if f.status == wrong and f.curve is not None and hardly_begun(f.curve.length_mm, f.expected_mm):
-            out[n] = replace(f, message=f"{f.message}; or entry_direction points back along the wire: turn it round")
+            out[n] = replace(f, message=f"{f.message}; {why}")
     return out
 
 

@@ -74,6 +74,8 @@ def trial_of(
         voxel_mm=voxel_mm,
         roll_free=roll_free,
         roll_sigma_deg=ROLL_DEG if case.roll_sigma_deg is None else case.roll_sigma_deg,
+        lumen_bias_mm=case.uncertainty.lumen_bias_mm,
+        lumen_mm=case.uncertainty.lumen_mm,
         catheter=case.catheter,
         force_N=force,
         force_sigma_N=case.push_force_sigma_N,
