@@ -198,7 +198,7 @@ def _results(out: Path, cases: dict[str, CaseFiles], closed: tuple[str, ...], da
     whole = table(SUMMARY, OVERALL_FILE)
     errors = _of_all({name: case.errors for name, case in cases.items() if name not in damaged}, ERRORS)
     beside = table(FAILURES), table(SWEEP), table(SIMULATORS), table(WHERE)
-    return Results(out, table(SUMMARY), whole, errors, *beside, Cases(cases), closed, damaged)
+    return Results(out.absolute(), table(SUMMARY), whole, errors, *beside, Cases(cases), closed, damaged)
 
 
 def _of_all(by_case: dict[str, pd.DataFrame], kind: Table) -> pd.DataFrame:

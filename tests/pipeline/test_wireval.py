@@ -19,6 +19,7 @@ from pipeline.run.provenance import package_version
 from reports.case_files import read_case
 from reports.sweep import UNCHANGED
 from tests.pipeline.known_study import run_known, write_csv
+from tests.reports.fake_results import FakeCase, write_run
 
 
 @pytest.fixture(scope="module")
@@ -198,6 +199,23 @@ def test_a_run_gives_frames(study: Path, tmp_path: Path) -> None:
     open_again = wireval.run(study, tmp_path / "out", resume=True, **kept)
     assert open_again.ok
     assert not (tmp_path / "out" / "gates.json").exists()
+
+
+def test_results_are_of_their_folder_wherever_the_script_goes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """After a chdir the tables were empty, or those of another run whose folder has the same name."""
+    for name in ("a", "b"):
+        write_run(tmp_path / name / "out", [FakeCase("c", frames=1 + (name == "b"))])
+    monkeypatch.chdir(tmp_path / "a")
+    with pytest.warns(UserWarning, match="ledger.json is missing"):
+        results = wireval.read_results("out")
+    monkeypatch.chdir(tmp_path / "b")
+    case = results.cases["c"]
+    assert set(case.points["frame"]) == {0}, "b has two"
+    assert results.out == case.folder.parents[1] == tmp_path / "a" / "out"
+    for name, read in (("points.csv.gz", lambda: case.points), ("frames.h5", lambda: case.read_frame(0))):
+        (case.folder / name).unlink()
+        with pytest.raises(ValueError, match=f"a/out/cases/c/{re.escape(name)}: no such file, though the case had one"):
+            read()
 
 
 def replayed_mm(case: wireval.CaseFiles) -> float:
