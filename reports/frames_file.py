@@ -4,7 +4,8 @@
     /scan/lumen_mip_A    optional uint8, projection of the lumen's mask along array axis A
     /scan/entry_slab_A   optional uint8, where no lumen was found (the crop is the whole scan then): its maxima near the
                          entry along array axis A
-    /frames/NNN          datasets of a frame, see below
+    /frames/NNN          datasets of a frame, see below; attribute ``status``, as in errors.csv: curves of a frame that
+                         is not ok are kept to look at, and count in no score
     /frames/NNN/mip_A    optional uint8, maximum-intensity projection along array axis A: (y, z), (x, z), (x, y)
     /frames/NNN/straightened    optional uint8, the scan along the traced wire: planes across it, ``along_mm`` apart,
                          of samples ``across_mm`` apart, the wire in their middle; ``normal``: their first axis
@@ -61,6 +62,9 @@ class Straightened(NamedTuple):
 class FrameArrays:
     """Arrays of one frame; what does not apply is None.
 
+    status : as in errors.csv. Curves of a frame that is not ok are kept to look at and count in no score; empty where
+    an older version wrote the file.
+
     traced_mm (n, 3), simulated_mm (k, 3), truth_mm (t, 3) : LPS mm, from the entry to the tip. The trace may begin some
     tenths of a mm before or beyond the clamp's plane, from which insertion_mm counts: its own length is another.
     trace_sigma_mm (n,) : standard deviation of the traced points.     trace_flags (n,) : 1 where a gap is bridged, the
@@ -92,11 +96,12 @@ class FrameArrays:
     median_mm: Array | None = None
     covariance_mm2: Array | None = None
     straightened: Straightened | None = None
+    status: str = ""
 
     def __repr__(self) -> str:
         """What a prompt shows: which arrays there are, and of what shape."""
         shapes = [f", {name} {one.shape}" for name in _ARRAYS if (one := getattr(self, name)) is not None]
-        return f"FrameArrays(frame {self.frame}{''.join(shapes)})"
+        return f"FrameArrays(frame {self.frame}{f', {self.status}' * bool(self.status)}{''.join(shapes)})"
 
     @property
     def curves(self) -> dict[str, Array]:
@@ -111,7 +116,7 @@ _PACKED: dict[str, Any] = {"compression": "gzip", "compression_opts": 1}
 """One fast pass of gzip: a projection is mostly dark, so it halves."""
 _OF_PLANES = ("along_mm", "across_mm", "normal")
 _GEOMETRY = ("spacing_mm", "origin_mm", "direction", "shape")
-_ARRAYS = tuple(f.name for f in fields(FrameArrays) if f.name not in ("frame", "mips", "straightened"))
+_ARRAYS = tuple(f.name for f in fields(FrameArrays) if f.name not in ("frame", "mips", "straightened", "status"))
 
 
 def write_frames(path: Path, scan: ScanCrop | None, frames: Iterable[FrameArrays]) -> None:
@@ -128,6 +133,7 @@ def write_frames(path: Path, scan: ScanCrop | None, frames: Iterable[FrameArrays
             _write_pictures(group, "entry_slab", scan.entry_slabs)
         for frame in frames:
             group = everything.create_group(f"{frame.frame:03d}")
+            group.attrs["status"] = frame.status
             for name in _ARRAYS:
                 if getattr(frame, name) is not None:
                     values = group.create_dataset(name, data=np.asarray(getattr(frame, name), dtype=np.float64))
@@ -163,7 +169,8 @@ def read_frame(path: Path, frame: int) -> FrameArrays:
         names = {int(name): name for name in file["frames"]}
         group = file["frames"][names[frame]]
         arrays = {name: np.array(group[name], float) for name in _ARRAYS if name in group}
-        return FrameArrays(frame, mips=_read_pictures(group, "mip"), straightened=_read_straightened(group), **arrays)
+        others = {"mips": _read_pictures(group, "mip"), "straightened": _read_straightened(group)}
+        return FrameArrays(frame, status=str(group.attrs.get("status", "")), **others, **arrays)
 
 
 def read_arrays(path: Path, *names: str) -> dict[int, dict[str, Array]]:

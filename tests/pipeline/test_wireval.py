@@ -148,7 +148,7 @@ def test_a_run_gives_frames(study: Path, tmp_path: Path) -> None:
     assert len(repr(results).splitlines()) < 13
     assert len(repr(results)) < 1000
     assert re.fullmatch(r"\{'straight': CaseFiles\('.*/straight', ok, 2 frames\)\}", repr(results.cases))
-    assert re.match(r"FrameArrays\(frame 1, traced_mm \(\d+, 3\), ", repr(results.cases["straight"].read_frame(1)))
+    assert re.match(r"FrameArrays\(frame 1, ok, traced_mm \(\d+, 3\), ", repr(results.cases["straight"].read_frame(1)))
     assert wireval.read_results(tmp_path / "out").errors.equals(results.errors)
     assert replayed_mm(results.cases["straight"]) < 0.08, "0.1 voxel; there was no way from a run to its wall"
     changed, settings = results.cases["straight"], results.cases["straight"].result["config"]["simulate"]

@@ -494,7 +494,8 @@ def test_frames_file_reads_back(tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
     scan = ScanCrop(np.array([0.3, 0.4, 0.5]), rng.normal(size=3), TURN, (4, 5, 6), {1: np.eye(4, 6, dtype=np.uint8)})
     curve, picture = rng.normal(size=(7, 3)), rng.integers(0, 255, (5, 6), dtype=np.uint8)
-    frames = (FrameArrays(n, traced_mm=curve + n, contact_force_N=curve, mips={0: picture}) for n in (11, 2))
+    arrays = {"contact_force_N": curve, "mips": {0: picture}, "status": "trace_low_contrast"}
+    frames = (FrameArrays(n, traced_mm=curve + n, **arrays) for n in (11, 2))
     write_frames(tmp_path / "frames.h5", scan, frames)
     back = read_scan(tmp_path / "frames.h5")
     assert back is not None
@@ -506,6 +507,10 @@ def test_frames_file_reads_back(tmp_path: Path) -> None:
     np.testing.assert_array_equal(frame.traced_mm, curve + 11)
     np.testing.assert_array_equal(frame.mips[0], picture)
     assert frame.simulated_mm is None
+    assert repr(frame).startswith("FrameArrays(frame 11, trace_low_contrast, traced_mm (7, 3)"), "a wire like any other"
+    with h5py.File(tmp_path / "frames.h5", "r+") as file:
+        del file["frames/011"].attrs["status"]
+    assert read_frame(tmp_path / "frames.h5", 11).status == "", "of an older version"
 
 
 def test_every_dataset_of_a_frames_file_says_its_unit(tmp_path: Path) -> None:
