@@ -34,7 +34,7 @@ class _Thing(NamedTuple):
 
 
 def wire_name(kind: str, frame: int, status: str) -> str:
-    """What 3D Slicer calls a wire. status : of its frame; one that is not ok is named, as its wires count in no score."""
+    """What 3D Slicer calls a wire. status : of its frame, which is named where the wire counts in no score."""
     refused = kind != "true" and status not in GOOD
     return f"{kind} {frame:03d}" + f" (refused: {status})" * refused
 
