@@ -169,8 +169,9 @@ def read_frame(path: Path, frame: int) -> FrameArrays:
         names = {int(name): name for name in file["frames"]}
         group = file["frames"][names[frame]]
         arrays = {name: np.array(group[name], float) for name in _ARRAYS if name in group}
-        others = {"mips": _read_pictures(group, "mip"), "straightened": _read_straightened(group)}
-        return FrameArrays(frame, status=str(group.attrs.get("status", "")), **others, **arrays)
+        pictures, straight = _read_pictures(group, "mip"), _read_straightened(group)
+        status = str(group.attrs.get("status", ""))
+        return FrameArrays(frame, mips=pictures, straightened=straight, status=status, **arrays)
 
 
 def read_arrays(path: Path, *names: str) -> dict[int, dict[str, Array]]:

@@ -125,7 +125,9 @@ def test_a_run_gives_frames(study: Path, tmp_path: Path) -> None:
     kept = {"settings": {"solver.segment_mm": 2.0, "compare.simulated_nulls": False}, "quiet": True, "until": "compare"}
     results = wireval.run(study, tmp_path / "out", sweep=wall, **kept)
     assert results.ok
-    typed = json.loads((tmp_path / "out" / "provenance.json").read_text(encoding="utf-8"))["argv"]
+    begun = json.loads((tmp_path / "out" / "provenance.json").read_text(encoding="utf-8"))
+    assert begun["cwd"] == str(Path.cwd()), "paths in argv may be relative"
+    typed = begun["argv"]
     assert typed[:3] == ["wireval", "run", str(study)], "the next command names what was called"
     assert list(results.errors["case"]) == ["straight"] * 2
     assert list(results.sweep["parameter"]) == [UNCHANGED, "simulate.wall_scale"]
