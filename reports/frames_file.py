@@ -30,7 +30,7 @@ Array = NDArray[np.float64]
 Pictures = Mapping[int, NDArray[np.uint8]]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class ScanCrop:
     """Geometry of the vessel's crop in LPS mm, and by array axis projections of the lumen, or of slabs at the entry."""
 
@@ -40,6 +40,11 @@ class ScanCrop:
     shape: tuple[int, int, int]
     lumen_mips: Pictures = field(default_factory=dict)
     entry_slabs: Pictures = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        """What a prompt shows: not the pictures."""
+        spacing = " x ".join(f"{edge:.4g}" for edge in self.spacing_mm)
+        return f"ScanCrop({self.shape}, voxels of {spacing} mm, origin {np.round(self.origin_mm, 3).tolist()})"
 
     def to_index(self, points_mm: Array) -> Array:
         """Continuous voxel indices (n, 3) of LPS points (n, 3)."""

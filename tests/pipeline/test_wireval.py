@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import json
 import os
+import pickle
 import re
 import subprocess
 import sys
+from copy import copy
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,9 +17,14 @@ import pytest
 
 import wireval
 from pipeline.cli import main
+from pipeline.load.geometry import LoadError
 from pipeline.run.provenance import package_version
+from pipeline.status import FrameStatus
+from pipeline.study.manifest import ManifestError
+from reports.atomic import WriteError
 from reports.case_files import read_case
 from reports.sweep import UNCHANGED
+from reports.texts import UnreadableError
 from tests.pipeline.known_study import run_known, write_csv
 from tests.reports.fake_results import FakeCase, write_run
 
@@ -260,6 +267,24 @@ def test_verbs_are_called_as_they_are_typed(monkeypatch: pytest.MonkeyPatch, tmp
     monkeypatch.setattr(wireval, "carried_out", lambda args: 2)
     with pytest.raises(wireval.InputError, match="nothing was run"):
         wireval.calibrate("m.toml", tmp_path)
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        wireval.InputError(["one", "two"]),
+        ManifestError(["one", "two"], sound=["a case"]),  # type: ignore[list-item]
+        wireval.StageError(FrameStatus.SEGMENT_FAILED, "grey: got 1"),
+        LoadError("a.mha: got 1"),
+        UnreadableError("a.mha: got 1"),
+        WriteError("a.mha: no room"),
+    ],
+)
+def test_errors_come_whole_out_of_another_process(error: Exception) -> None:
+    """Problems were split into letters, and a StageError broke the pool of its process."""
+    found = pickle.loads(pickle.dumps(error))
+    assert (type(found), str(found), vars(found)) == (type(error), str(error), vars(error))
+    assert copy(error).args == error.args
 
 
 def test_what_cannot_be_used_is_raised(study: Path, tmp_path: Path) -> None:

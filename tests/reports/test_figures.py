@@ -500,6 +500,7 @@ def test_frames_file_reads_back(tmp_path: Path) -> None:
     back = read_scan(tmp_path / "frames.h5")
     assert back is not None
     assert (back.shape, list(back.lumen_mips)) == ((4, 5, 6), [1])
+    assert repr(back).startswith("ScanCrop((4, 5, 6), voxels of 0.3 x 0.4 x 0.5 mm, origin ["), "a dump of its pictures"
     np.testing.assert_array_equal(back.direction, TURN)
     np.testing.assert_allclose(back.to_index(scan.origin_mm + TURN @ (scan.spacing_mm * [1, 2, 3])), [1, 2, 3])
     assert frame_numbers(tmp_path / "frames.h5") == (2, 11)
