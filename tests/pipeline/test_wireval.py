@@ -75,12 +75,24 @@ def test_a_notebook_s_backend_is_its_own(named: str, left: str) -> None:
 
 
 def test_a_check_gives_sentences(study: Path, tmp_path: Path) -> None:
-    assert wireval.check(study) == []
+    with pytest.warns(UserWarning, match="less than half a voxel"):
+        assert wireval.check(study) == []
     assert wireval.check(tmp_path / "none.toml") == [f"{tmp_path / 'none.toml'}: no such manifest"]
     assert "expected a number from 0.01 to 20" in wireval.check(study, settings={"solver.segment_mm": -1})[0]
     nested = {"solver": {"segment_mm": 0.5}}
     assert wireval.check(study, settings=nested) == ['settings: write {"solver.segment_mm": 0.5}']
     assert wireval.check(tmp_path)[0].endswith("here or in frames/"), "a folder without scans"
+
+
+def test_a_check_warns_of_what_is_not_plausible(study: Path, tmp_path: Path) -> None:
+    """It was printed, and [] told a script that nothing is wrong."""
+    text = (study / "manifest.toml").read_text(encoding="utf-8")
+    for name in ("reference.mha", "frames", "truth.json"):
+        (tmp_path / name).symlink_to(study / name)
+    thick = re.sub(r"\nradius_mm = .*", "\nradius_mm = 1.5", text)
+    (tmp_path / "manifest.toml").write_text(thick, encoding="utf-8")
+    with pytest.warns(UserWarning, match="radius_mm"):
+        assert wireval.check(tmp_path) == []
 
 
 OTHER_KINDS = [None, 3, 1.5, True, [3], {3: 4}, {"a": 3}, "", b"x", "a\0b", object(), (1, 2), float("nan"), "x" * 5000]
@@ -116,6 +128,13 @@ def test_an_argument_of_another_kind_is_refused_by_name(
     [
         ({"sweep": 3}, 'sweep: got 3; expected a mapping to lists of values, {"simulate.wall_scale": [0.5, 2]}'),
         ({"fail_if": 3}, 'fail_if: got 3; expected a condition as text, "rms_mm>0.5", or a list of such'),
+        (
+            {"sweep": {"simulate.wall_scale": "0.5,2"}},
+            "sweep: got {'simulate.wall_scale': '0.5,2'}; expected a mapping",
+        ),
+        ({"quiet": "yes"}, "quiet: got 'yes'; expected True or False"),
+        ({"fresh": 1}, "fresh: got 1; expected True or False"),
+        ({"embed": "no"}, "embed: got 'no'; expected True or False"),
         ({"out": b"out"}, "out: got b'out'; expected a path, as text or pathlib.Path"),
         ({"manifest": "a\0b"}, "manifest: a\0b: cannot be opened (the name holds a zero byte)"),
     ],
@@ -344,6 +363,12 @@ def test_what_synth_cannot_do_is_in_its_error(tmp_path: Path) -> None:
     """It was "the problems stand above", which a notebook does not show."""
     with pytest.raises(wireval.InputError, match="frames: got 0; allowed: 1 or more"):
         wireval.synth("bend", tmp_path / "study", frames=0)
+
+
+def test_what_synth_prints_is_no_study(tmp_path: Path) -> None:
+    """It returned the path of a manifest that is not there."""
+    with pytest.raises(wireval.InputError, match="list: it writes no study; `wireval synth --list` names the scenes"):
+        wireval.synth("straight", tmp_path / "study", list=True)
 
 
 def test_settings_may_be_numbers_of_numpy(tmp_path: Path) -> None:
