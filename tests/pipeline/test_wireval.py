@@ -128,10 +128,7 @@ def test_an_argument_of_another_kind_is_refused_by_name(
     [
         ({"sweep": 3}, 'sweep: got 3; expected a mapping to lists of values, {"simulate.wall_scale": [0.5, 2]}'),
         ({"fail_if": 3}, 'fail_if: got 3; expected a condition as text, "rms_mm>0.5", or a list of such'),
-        (
-            {"sweep": {"simulate.wall_scale": "0.5,2"}},
-            "sweep: got {'simulate.wall_scale': '0.5,2'}; expected a mapping",
-        ),
+        ({"sweep": {"simulate.wall_scale": "0.5,2"}}, "sweep: got {'simulate.wall_scale': '0.5,2'}; expected"),
         ({"quiet": "yes"}, "quiet: got 'yes'; expected True or False"),
         ({"fresh": 1}, "fresh: got 1; expected True or False"),
         ({"embed": "no"}, "embed: got 'no'; expected True or False"),
