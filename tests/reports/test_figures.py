@@ -206,6 +206,26 @@ def test_a_table_of_forces_tells_refused_frames_from_others(tmp_path: Path) -> N
     drawing = draw(CASE_FIGURES["contact_along_wire"], replace(case, samples=forces, errors=errors))
     told = {*zip(drawing.table["frame"], drawing.table["status"], strict=True)}
     assert told == {(0, "ok"), (2, "no_wire")}
+    (crosses,) = drawing.figure.axes[0].lines
+    assert list(crosses.get_ydata()) == [2], "the wire of a refused frame was drawn as any other"
+
+
+def test_long_names_leave_room_for_what_is_drawn(tmp_path: Path) -> None:
+    """Ids of 100 letters left the cells an inch, in which their numbers overlapped, and cut the colour bar's label."""
+    names = ["a" * 100, "b" * 99 + "c"]
+    out = write_run(tmp_path, [FakeCase(name, frames=3) for name in names])
+    errors = {name: read_case(out / "cases" / name).errors for name in names}
+    run = RunFiles(errors, tables.read(out / "summary.csv", SUMMARY), tables.read_if_there(None, SWEEP))
+    drawing = RUN_FIGURES["case_frame_map"](run)
+    assert drawing is not None
+    drawing.figure.canvas.draw()
+    cells, bar = drawing.figure.axes
+    assert cells.get_position().width > 0.5
+    assert [one.get_text()[-2:] for one in cells.get_yticklabels()] == ["aa", "bc"]
+    edge = drawing.figure.bbox
+    assert bar.yaxis.label.get_window_extent().y0 >= edge.y0
+    assert bar.yaxis.label.get_window_extent().y1 <= edge.y1
+    assert set(drawing.table["case"]) == set(names), "whole in the table beside it"
 
 
 def test_heat_map_shows_each_sample_at_its_place(tmp_path: Path) -> None:
