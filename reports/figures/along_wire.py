@@ -42,7 +42,8 @@ def contact_along_wire(case: CaseFiles) -> Drawing | None:
     # the wires of refused frames are shown, too: with the cross that the map of a run has for such a frame
     status = drawing.table["frame"].map(case.errors.set_index("frame")["status"])
     refused = drawing.table["frame"][~status.isin(GOOD)].unique()
-    drawing.figure.axes[0].plot(0.0 * refused, refused, "x", color=BAD, markersize=7, clip_on=False, zorder=5)
+    if len(refused):
+        drawing.figure.axes[0].plot(0.0 * refused, refused, "x", color=BAD, markersize=7, clip_on=False, zorder=5)
     return replace(drawing, table=drawing.table.assign(status=status))
 
 
