@@ -58,7 +58,19 @@ class FrameStatus(Enum):
         return self.name.lower()
 
 
-class StageError(Exception):
+class _Sent(Exception):
+    """An exception that comes whole out of another process: pickle would call its class with the text alone."""
+
+    def __reduce__(self) -> tuple[object, ...]:
+        """Its class and text, and what it holds."""
+        return _received, (type(self), str(self)), vars(self)
+
+
+def _received(kind: type[_Sent], text: str) -> _Sent:
+    return kind.__new__(kind, text)
+
+
+class StageError(_Sent):
     """A stage cannot go on; the message has the five parts (what, where, got, allowed, do this)."""
 
     def __init__(self, status: FrameStatus, message: str) -> None:
@@ -66,7 +78,7 @@ class StageError(Exception):
         self.status = status
 
 
-class InputError(Exception):
+class InputError(_Sent):
     """What a user wrote cannot be used; ``problems`` lists everything that is wrong with it.
 
     place : where it was written, as the line that counts the problems calls it; empty for the manifest.

@@ -14,7 +14,7 @@ from reports.frames_file import FrameArrays, ScanCrop
 from reports.records import ALWAYS, read_json, run_records
 from reports.result_file import read_result
 from reports.schema import ERRORS, POINTS, TIMINGS
-from reports.texts import size_of
+from reports.texts import size_of, unreadable
 
 GOOD = ("ok", "simulated", "roll_fitted")
 WORST = "p95_mm"
@@ -51,8 +51,15 @@ class CaseFiles:
 
     @property
     def points(self) -> pd.DataFrame:
-        """Every compared point. By far the largest table: it is read here where ``read_case`` did not."""
-        return tables.read_if_there(self.folder / POINTS.file, POINTS) if self.samples is None else self.samples
+        """Every compared point. By far the largest table: it is read here where ``read_case`` did not.
+
+        Raises UnreadableError where frames were compared and the file is gone.
+        """
+        if self.samples is not None:
+            return self.samples
+        if self.result and self.errors["rms_mm"].notna().any():
+            _there(self.folder / POINTS.file)
+        return tables.read_if_there(self.folder / POINTS.file, POINTS)
 
     @property
     def good(self) -> pd.DataFrame:
@@ -78,7 +85,12 @@ class CaseFiles:
         return dict(self.result.get("summary", {}))
 
     def read_frame(self, frame: int) -> FrameArrays:
-        """Read the arrays of one frame from the disk, each time anew. Raises KeyError, naming the frames there are."""
+        """Read the arrays of one frame from the disk, each time anew.
+
+        Raises KeyError, naming the frames there are, and UnreadableError where frames.h5 is gone.
+        """
+        if len(self.errors):
+            _there(self.folder / "frames.h5")
         if frame not in self.frames:
             there = f"there are {listed([*map(str, self.frames)])}" if self.frames else "there is none"
             raise KeyError(f"case {self.name!r} has no arrays of frame {frame!r}; {there}")
@@ -95,7 +107,8 @@ def read_case(folder: Path, points: bool = True, rest: bool = True) -> CaseFiles
     samples = tables.read_if_there(folder / POINTS.file, POINTS) if points else None
     timings = tables.read_if_there(folder / TIMINGS.file if rest else None, TIMINGS)
     scan, numbers = _frames(folder / "frames.h5", rest)
-    return CaseFiles(folder, read_result(folder / "result.json"), errors, samples, timings, scan, numbers)
+    # absolute: much of it is read later, perhaps from another working directory, where another run may lie
+    return CaseFiles(folder.absolute(), read_result(folder / "result.json"), errors, samples, timings, scan, numbers)
 
 
 def results_in(out_dir: Path) -> dict[str, dict[str, Any]]:
@@ -255,6 +268,12 @@ def _folders(out_dir: Path, named: bool) -> list[Path]:
 def thinned(count: int, most: int) -> NDArray[np.int_]:
     """Places of at most ``most`` of ``count`` frames, evenly spread, the first and the last among them."""
     return np.unique(np.linspace(0, max(count - 1, 0), min(count, most)).round().astype(int))
+
+
+def _there(path: Path) -> None:
+    """Raise UnreadableError where a file is gone: of an empty table nobody could tell it from one without rows."""
+    if not path.is_file():
+        raise unreadable(path, "no such file, though the case had one; put the folder back, or run the case again")
 
 
 def _frames(path: Path, scan: bool) -> tuple[ScanCrop | None, tuple[int, ...]]:

@@ -4,7 +4,8 @@
     /scan/lumen_mip_A    optional uint8, projection of the lumen's mask along array axis A
     /scan/entry_slab_A   optional uint8, where no lumen was found (the crop is the whole scan then): its maxima near the
                          entry along array axis A
-    /frames/NNN          datasets of a frame, see below
+    /frames/NNN          datasets of a frame, see below; attribute ``status``, as in errors.csv: curves of a frame that
+                         is not ok are kept to look at, and count in no score
     /frames/NNN/mip_A    optional uint8, maximum-intensity projection along array axis A: (y, z), (x, z), (x, y)
     /frames/NNN/straightened    optional uint8, the scan along the traced wire: planes across it, ``along_mm`` apart,
                          of samples ``across_mm`` apart, the wire in their middle; ``normal``: their first axis
@@ -29,7 +30,7 @@ Array = NDArray[np.float64]
 Pictures = Mapping[int, NDArray[np.uint8]]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class ScanCrop:
     """Geometry of the vessel's crop in LPS mm, and by array axis projections of the lumen, or of slabs at the entry."""
 
@@ -39,6 +40,11 @@ class ScanCrop:
     shape: tuple[int, int, int]
     lumen_mips: Pictures = field(default_factory=dict)
     entry_slabs: Pictures = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        """What a prompt shows: not the pictures."""
+        spacing = " x ".join(f"{edge:.4g}" for edge in self.spacing_mm)
+        return f"ScanCrop({self.shape}, voxels of {spacing} mm, origin {np.round(self.origin_mm, 3).tolist()})"
 
     def to_index(self, points_mm: Array) -> Array:
         """Continuous voxel indices (n, 3) of LPS points (n, 3)."""
@@ -60,6 +66,9 @@ class Straightened(NamedTuple):
 @dataclass(frozen=True, eq=False, repr=False)
 class FrameArrays:
     """Arrays of one frame; what does not apply is None.
+
+    status : as in errors.csv. Curves of a frame that is not ok are kept to look at and count in no score; empty where
+    an older version wrote the file.
 
     traced_mm (n, 3), simulated_mm (k, 3), truth_mm (t, 3) : LPS mm, from the entry to the tip. The trace may begin some
     tenths of a mm before or beyond the clamp's plane, from which insertion_mm counts: its own length is another.
@@ -92,11 +101,12 @@ class FrameArrays:
     median_mm: Array | None = None
     covariance_mm2: Array | None = None
     straightened: Straightened | None = None
+    status: str = ""
 
     def __repr__(self) -> str:
         """What a prompt shows: which arrays there are, and of what shape."""
         shapes = [f", {name} {one.shape}" for name in _ARRAYS if (one := getattr(self, name)) is not None]
-        return f"FrameArrays(frame {self.frame}{''.join(shapes)})"
+        return f"FrameArrays(frame {self.frame}{f', {self.status}' * bool(self.status)}{''.join(shapes)})"
 
     @property
     def curves(self) -> dict[str, Array]:
@@ -111,7 +121,7 @@ _PACKED: dict[str, Any] = {"compression": "gzip", "compression_opts": 1}
 """One fast pass of gzip: a projection is mostly dark, so it halves."""
 _OF_PLANES = ("along_mm", "across_mm", "normal")
 _GEOMETRY = ("spacing_mm", "origin_mm", "direction", "shape")
-_ARRAYS = tuple(f.name for f in fields(FrameArrays) if f.name not in ("frame", "mips", "straightened"))
+_ARRAYS = tuple(f.name for f in fields(FrameArrays) if f.name not in ("frame", "mips", "straightened", "status"))
 
 
 def write_frames(path: Path, scan: ScanCrop | None, frames: Iterable[FrameArrays]) -> None:
@@ -128,6 +138,7 @@ def write_frames(path: Path, scan: ScanCrop | None, frames: Iterable[FrameArrays
             _write_pictures(group, "entry_slab", scan.entry_slabs)
         for frame in frames:
             group = everything.create_group(f"{frame.frame:03d}")
+            group.attrs["status"] = frame.status
             for name in _ARRAYS:
                 if getattr(frame, name) is not None:
                     values = group.create_dataset(name, data=np.asarray(getattr(frame, name), dtype=np.float64))
@@ -163,7 +174,9 @@ def read_frame(path: Path, frame: int) -> FrameArrays:
         names = {int(name): name for name in file["frames"]}
         group = file["frames"][names[frame]]
         arrays = {name: np.array(group[name], float) for name in _ARRAYS if name in group}
-        return FrameArrays(frame, mips=_read_pictures(group, "mip"), straightened=_read_straightened(group), **arrays)
+        pictures, straight = _read_pictures(group, "mip"), _read_straightened(group)
+        status = str(group.attrs.get("status", ""))
+        return FrameArrays(frame, mips=pictures, straightened=straight, status=status, **arrays)
 
 
 def read_arrays(path: Path, *names: str) -> dict[int, dict[str, Array]]:

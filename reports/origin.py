@@ -186,7 +186,9 @@ def _cases(found: Iterable[str]) -> Told:
 
 
 OF_CASE = "[[case]]"
-STATED, AT_CHOICE = {"wire": "[wires]", "wall": "[case.wall]", "entry": OF_CASE}, ("role", "group", "down", "catheter")
+SURE = "uncertainty"
+STATED = {"wire": "[wires]", "wall": "[case.wall]", "entry": OF_CASE, "manifest_keys": OF_CASE, SURE: f"[case.{SURE}]"}
+AT_CHOICE = "role", "group", "down", "catheter"
 """Parts of result.json that say what the manifest states of a case, with calibrated parameters where there are any, by
 its table for them; and keys that are left out where it states none."""
 _TEXT = "manifest (its text alone: it states the same of every case)"
@@ -198,10 +200,12 @@ def _stated(found: Mapping[str, Mapping[str, Any]], cases: Iterable[str]) -> dic
     """What the manifest states, by case and key. Results of an earlier version do not say all of it."""
     said: dict[tuple[str, str], str] = {}
     for case in sorted(cases):
+        keys = dict(found[case].get("manifest_keys", {}))
+        told = {**found[case], "manifest_keys": keys, SURE: keys.pop(SURE, None) or {}}
         values = {
             f"{table} {key}": value
             for part, table in STATED.items()
-            for key, value in found[case].get(part, {}).items()
+            for key, value in told.get(part, {}).items()
             if not key.startswith(FOUND)
         }
         values |= {f"{OF_CASE} {name}": found[case].get(name) for name in AT_CHOICE}

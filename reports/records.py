@@ -13,6 +13,7 @@ from reports import texts
 WRITTEN, AGAIN = "what `wireval run` wrote", "give the command of the run again, with --resume"
 HELD: dict[str, tuple[type[Any], ...]] = {
     "config": (dict, dict, dict), "provenance": (dict,), "summary": (dict,), "counters": (dict,), "entry": (dict,),
+    "manifest_keys": (dict,),
     "chosen": (dict,), "inputs": (list, dict), "failures": (list, dict), "frames": (list, dict), "sweep": (list, dict),
     "planned": (list, str), "left_out": (list, str), "swept": (list, str), "warnings": (list, str),
     "warnings_of_wires": (list, str),

@@ -126,7 +126,7 @@ class Verdict:
         for head, rows in lists.items():
             cut = f" (the first {most} of {len(rows)}; --json has all)" * (len(rows) > most)
             shown[head + cut] = rows.head(most)
-        return shown | {"Over the frames of both": pd.DataFrame(self.pooled), "Frame by frame": self.frames.by_column}
+        return shown | {"Over the cases of both": pd.DataFrame(self.pooled), "Frame by frame": self.frames.by_column}
 
     def lines(self) -> list[str]:
         """For a terminal: what differs, the verdict, the worst frames, tables; and the verdict again at the end."""

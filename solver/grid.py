@@ -44,7 +44,7 @@ def _own(values: object) -> NDArray[Any]:
     return read_only(array.copy(order="K") if array.flags.writeable else array)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Grid:
     """Values on a regular grid, indexed x, y, z.
 
@@ -69,6 +69,11 @@ class Grid:
             object.__setattr__(self, name, read_only(value.copy()))
         if not np.allclose(self.direction.T @ self.direction, np.eye(3), atol=1e-4):
             refuse("grid", "direction", self.direction.tolist(), "an orthonormal matrix", "columns of length 1")
+
+    def __repr__(self) -> str:
+        """What a prompt and messages show: not its values."""
+        spacing = " x ".join(f"{edge:.4g}" for edge in self.spacing_mm)
+        return f"Grid({self.values.dtype} {self.shape}, voxels of {spacing} mm)"
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Freeze what was unpickled."""

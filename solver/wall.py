@@ -125,7 +125,7 @@ def _bounds(coefficients: NDArray[np.float32], to_index: Array) -> tuple[float, 
     return float(gap), float(slope)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class VesselWall:
     """The wall of a lumen, given by the signed distance to it in mm, negative inside. Its law is ``_kernels.wall_law``.
 
@@ -141,8 +141,8 @@ class VesselWall:
     stiffness_N_mm2: float
     friction: float = 0.0
     hull: str = "offset"
-    doubts: str = field(init=False, repr=False)
-    field: Field = field(init=False, repr=False)
+    doubts: str = field(init=False)
+    field: Field = field(init=False)
 
     def __post_init__(self) -> None:
         """Prefilter the distances into spline coefficients, so that the spline takes the values at the nodes."""
@@ -159,6 +159,10 @@ class VesselWall:
         gap, slope = _bounds(coefficients, to_index)
         origin, spacing = np.array(self.distance.origin_mm), self.distance.voxel_mm
         object.__setattr__(self, "field", Field(coefficients, to_index, origin, gap, slope, spacing, marks))
+
+    def __repr__(self) -> str:
+        """What a prompt and messages show: not its distances."""
+        return f"VesselWall({self.stiffness_N_mm2:g} N/mm2, friction {self.friction:g}, {self.hull}, {self.distance!r})"
 
     def _check_law(self) -> None:
         """Refuse a stiffness or a friction that no wall has."""

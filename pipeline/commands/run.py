@@ -41,7 +41,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--case-memory", type=float, default=math.inf, metavar="MIB", help="MiB of memory that a case may take")
     add("--shard", default="", metavar="I/N", help="only the I-th of N parts of the cases; merge with cp -r")
     add("--only", action="append", default=[], metavar="ID", help="only this case; may be repeated")
-    add("--until", default="report", metavar="STAGE", help="load, segment, trace, simulate, compare")
+    says = "load, segment, trace, simulate, compare (draws no pages) or report (default)"
+    add("--until", default="report", metavar="STAGE", help=says)
     add("--executor", default="", metavar="ADDRESS", help="tcp://host:port of a dask scheduler")
     add("--skip-bad", action="store_true", help="leave out and name cases whose files cannot be used; exit 1")
     add("--resume", action="store_true", help="go on in an OUT made from another manifest or with other settings")

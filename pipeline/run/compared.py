@@ -23,7 +23,7 @@ from reports.two_runs import Judged, Verdict, newly_void, newly_warned, warned_o
 from reports.two_scores import together
 
 OF_ALL = "frames", "frames_ok", "within_1mm"
-"""What a run's failures change: over all of its frames."""
+"""What a run's failures change: over all frames of these cases."""
 
 
 def compared(first: Path, second: Path, tolerance: Path | None = None) -> Verdict:
@@ -70,7 +70,14 @@ def _of_one(first: Path, second: Path, tolerance: Mapping[str, float]) -> Verdic
     otherwise = f"errors are measured otherwise in the second run ({ruler})" * bool(ruler)
     unpaired = "over all frames nothing is judged: no frame has points in both runs" * (paired is None)
     said = paired.verdict(allowed, otherwise) if paired else ""
-    pooled = _pooled(with_another(first, before), with_another(second, after))
+    both = there & {case.result.case for case in after}
+    # the predictor 'another' too is of these cases: without the others it is another guess, or none
+    pooled = _pooled(
+        *(
+            with_another(out, [case for case in run if case.result.case in both])
+            for out, run in ((first, before), (second, after))
+        )
+    )
     nearer = ""
     if paired and paired.value < 1.0 / allowed and len(frames.regressions) and not otherwise:
         nearer = f"but over all frames the errors are {paired.value:.3g} times those of the first run"
@@ -85,11 +92,11 @@ def _of_one(first: Path, second: Path, tolerance: Mapping[str, float]) -> Verdic
 def _pooled(before: Sequence[Found], after: Sequence[Found]) -> list[dict[str, Any]]:
     """What differs of overall.csv: columns that have a better side, and the predictor behind skill_strongest.
 
-    Errors are over the frames that count in both: a run of one easy case of four seemed the better one. Nothing of runs
-    without a case in common.
+    before, after : the cases of both runs: a run of one easy case of three seemed the better one. Errors are over the
+    frames that count in both.
     """
     runs = before, after
-    if not {case.result.case for case in before} & {case.result.case for case in after}:
+    if not before:
         return []
     both = frames_in(before) & frames_in(after)
     shares = [{name: run[name] for name in OF_ALL if name in run} for run in map(overall, runs)]

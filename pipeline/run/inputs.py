@@ -66,6 +66,22 @@ def stated(case: Case) -> str:
     return hashlib.sha256(f"{_told(case, UNSTATED)}{other}".encode()).hexdigest()[:16]
 
 
+def keys_of(case: Case) -> dict[str, Any]:
+    """Every key of a case as it was read, defaults and calibrated parameters included, but wire and wall, which stand
+    beside it in result.json, and places of files.
+    """
+    beside = {key: parts for key in OF_FILES if (parts := _parts(getattr(case, key)))}
+    return case.model_dump(exclude=UNSTATED | {"calibrated_kin", "wire", "wall"}) | beside
+
+
+def _parts(value: Source | Path | Sequence[Source] | None) -> list[dict[str, Any]]:
+    """Which dataset, item, label or level is stated of each file; nothing where none is of any."""
+    sources = value if isinstance(value, Sequence) else [value]
+    stated = [vars(source) if isinstance(source, Source) else {} for source in sources]
+    parts = [{name: part for name, part in of.items() if name != "path" and part not in ("", None)} for of in stated]
+    return parts if any(parts) else []
+
+
 def _told(case: Case, but: set[str]) -> str:
     return f"{case.model_dump_json(exclude=but)}{[_without_place(getattr(case, key)) for key in OF_FILES]}"
 

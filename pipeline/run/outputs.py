@@ -188,6 +188,7 @@ def _arrays_of(frame: Frame) -> frames_file.FrameArrays:
     curve, wire, errors = frame.curve, frame.simulated, frame.comparison
     return frames_file.FrameArrays(
         frame.index,
+        status=frame.status,
         traced_mm=None if curve is None else curve.points_mm,
         trace_sigma_mm=None if curve is None else curve.sigma_mm,
         trace_flags=None if curve is None else np.asarray(curve.flagged) + 2.0 * np.asarray(curve.in_plane),

@@ -72,9 +72,10 @@ def command_line() -> list[str]:
 
 
 def this_run() -> dict[str, Any]:
-    """Command line, machine and time of this run: what no result depends on, and what differs in every run."""
+    """Command line, working directory, machine and time of this run: no result depends on them, and they differ."""
     return {
         "argv": command_line(),
+        "cwd": str(Path.cwd()),
         "host": platform.node(),
         "system": platform.platform(),
         "processor": _processor(),

@@ -14,7 +14,7 @@ from pipeline.load import Header
 from pipeline.register.frames import record
 from pipeline.run import ledger
 from pipeline.run.calibrated import data_of
-from pipeline.run.inputs import contents_of, described, stated
+from pipeline.run.inputs import contents_of, described, keys_of, stated
 from pipeline.run.log import Log, early_end
 from pipeline.run.occupied import owner_of
 from pipeline.run.outputs import failure_rows, message_of
@@ -243,6 +243,7 @@ def details_of(case: Case, known: Known, log: Log) -> dict[str, Any]:
         "wire": case.wire,
         "wall": case.wall,
         "entry": clamp,
+        "manifest_keys": keys_of(case),
         **{name: value for name in ("down", "catheter") if (value := getattr(case, name)) is not None},
         "geometry": _geometry(known.scans.first),
         "inputs": described(case),

@@ -88,7 +88,8 @@ def write_view(
         export.write_collection(folder, f"wire_{kind}")
     with_wire = [frame.index for frame in known.frames if frame.simulated is not None]
     shown = max(with_wire, default=0)
-    export.write_scene(folder, shown, *_scans_of(known, shown))
+    refused = {frame.index: frame.status for frame in known.frames if not frame.ok}
+    export.write_scene(folder, shown, *_scans_of(known, shown), refused)
 
 
 _SLICER = (".mha", ".mhd", ".nrrd", ".nhdr", ".nii", ".nii.gz")
@@ -217,5 +218,5 @@ def _write_wire(
     known = {"rms_mm": "rms distance to the traced wire", "tip_mm": "distance of the tips"}
     numbers = {} if kind != "simulated" or frame.comparison is None else frame.comparison.values
     said = {text: float(numbers[column]) for column, text in known.items() if column in numbers}
-    path, label = folder / f"{name}.mrk.json", f"{kind} {frame.index:03d}"
+    path, label = folder / f"{name}.mrk.json", export.wire_name(kind, frame.index, frame.status)
     export.write_markups_curve(path, points if curve is None else curve, label, colours.WIRES[kind], said)

@@ -18,6 +18,8 @@ found raises ``StageError``; both say what the command would print.
 
 import json
 import sys
+import warnings
+from argparse import Namespace
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -37,7 +39,7 @@ from reports.texts import UnreadableError
 from reports.two_runs import Verdict
 from solver import Catheter, Grid, GuideWire, Insertion, Insertions, Snap, Solution, Status, VesselWall, relax
 
-from ._arguments import require
+from ._arguments import require, require_truth
 from .results import Results, read_results, read_run, wall_of
 
 __version__ = package_version()
@@ -87,6 +89,8 @@ def synth(scene: str, out: Place, **more: bool | float | str) -> Path:
     more : options of ``wireval synth``, such as ``frames=8`` or ``seed=3``.
     """
     require(scene=scene, out=out)
+    if "list" in more:
+        raise InputError(["list: it writes no study; `wireval synth --list` names the scenes, on the command line"])
     _carried_out("synth", scene, out=out, **more)
     return Path(out) / "manifest.toml"
 
@@ -95,14 +99,17 @@ def check(manifest: Place, *, settings: Settings | None = None) -> list[str]:
     """Every problem of a manifest, or of a folder of scans, as one sentence each; empty if none is found.
 
     Only the headers of scans are read, not their voxels, unless a manifest has to be inferred from a folder of scans.
+    Warns (UserWarning) of what is allowed and not plausible; what is assumed is printed.
     """
     try:
         require(manifest=manifest)
-        _carried_out("check", manifest, settings=settings)
+        found = _carried_out("check", manifest, settings=settings)
     except InputError as error:
         return list(error.problems)
     except StageError as error:
         return [str(error)]
+    for doubt in found.doubts:
+        warnings.warn(doubt, stacklevel=2)
     return []
 
 
@@ -122,7 +129,8 @@ def run(
     ``{"solver.segment_mm": 0.5}``.     sweep : ``{"simulate.wall_scale": [0.5, 2]}`` repeats the run with each of these
     values.     fail_if : a condition such as ``"rms_mm>0.5"``, or several; each one that holds is a sentence in
     ``results.closed``, and ``results.ok`` is then False.     more : any other option of ``wireval run`` by its long
-    name, such as ``fresh=True``, ``only=["run1"]``, ``until="trace"`` or ``quiet=True``.
+    name, such as ``fresh=True``, ``only=["run1"]``, ``until="trace"`` (``"report"``, all of it, if left out) or
+    ``quiet=True``.
 
     A frame or a case that fails raises nothing; ``results.failures`` says why it failed. Running again into the same
     folder keeps the cases that are finished. A shard without any case writes no files, and its tables are empty.
@@ -182,9 +190,13 @@ def diff(first: Place, second: Place, *, tolerance: Place | None = None) -> Verd
         raise InputError([str(error)]) from None
 
 
-def _carried_out(verb: str, manifest: Place, settings: object = None, **options: object) -> None:
-    """The verb as typed with these options. A list repeats its option, True stands for one alone."""
+def _carried_out(verb: str, manifest: Place, settings: object = None, **options: object) -> Namespace:
+    """Carry out the verb as typed with these options, and return what was parsed, with what the verb has left there.
+
+    A list repeats its option, True stands for one alone.
+    """
     words = [verb, str(manifest)]
+    require_truth(verb, options)
     chosen: Any = {} if settings is None else settings
     require(settings=chosen)
     for key, wanted in chosen.items():
@@ -198,13 +210,15 @@ def _carried_out(verb: str, manifest: Place, settings: object = None, **options:
                 words += [f"--{name.replace('_', '-')}"] + [str(one)] * (one is not True)
     with _typed(words):
         try:
-            code = carried_out(parsed(words))
+            args = parsed(words)
+            code = carried_out(args)
         except UnreadableError as error:
             raise InputError([str(error)]) from None
         except SystemExit:
             raise InputError([f"help, print_completion: of the command line alone; see help(wireval.{verb})"]) from None
     if code == BAD_INPUT:
         raise InputError([f"wireval {verb}: nothing was run; the problems stand above"])
+    return args
 
 
 def _plain(value: object) -> object:

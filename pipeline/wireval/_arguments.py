@@ -5,6 +5,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TypeGuard
 
+from pipeline.cli import parsers
 from pipeline.status import InputError
 from pipeline.wording import shortened
 from reports.case_files import CaseFiles
@@ -65,3 +66,15 @@ def require(**given: object) -> None:
                 raise InputError([f"{name}: got {shortened(repr(value), 80)}; expected {expected}"])
         except UnreadableError as error:
             raise InputError([f"{name}: {error}"]) from None
+
+
+def require_truth(verb: str, options: Mapping[str, object]) -> None:
+    """Raise InputError for the first option without a value, as ``quiet``, that is neither True nor False.
+
+    Its value was an argument too many: "yes: not an option of wireval run".
+    """
+    known = parsers()[1][verb]._option_string_actions
+    for name, value in options.items():
+        action = known.get(f"--{name.replace('_', '-')}")
+        if action is not None and action.nargs == 0 and not (value is None or isinstance(value, bool)):
+            raise InputError([f"{name}: got {shortened(repr(value), 80)}; expected True or False"])

@@ -92,7 +92,9 @@ class Results:
         more = f"\n... and {len(self.summary) - 10} more cases" if len(self.summary) > 10 else ""
         held: dict[str, Sized] = {"case": self.cases, "frame": self.errors, "failure": self.failures}
         counts = ", ".join(counted(len(of), name) for name, of in held.items())
-        return "\n".join([f"Results of {self.out}: {counts}", f"{rows}{more}", *self._amiss()])
+        # as a user types it: the whole path of a notebook is of one machine
+        where = self.out.relative_to(Path.cwd()) if self.out.is_relative_to(Path.cwd()) else self.out
+        return "\n".join([f"Results of {where}: {counts}", f"{rows}{more}", *self._amiss()])
 
     def _repr_html_(self) -> str:
         """What a notebook shows: a row a case, and below it what closed."""
@@ -201,7 +203,7 @@ def _results(out: Path, cases: dict[str, CaseFiles], closed: tuple[str, ...], da
     whole = table(SUMMARY, OVERALL_FILE)
     errors = _of_all({name: case.errors for name, case in cases.items() if name not in damaged}, ERRORS)
     beside = table(FAILURES), table(SWEEP), table(SIMULATORS), table(WHERE)
-    return Results(out, table(SUMMARY), whole, errors, *beside, Cases(cases), closed, damaged)
+    return Results(out.absolute(), table(SUMMARY), whole, errors, *beside, Cases(cases), closed, damaged)
 
 
 def _of_all(by_case: dict[str, pd.DataFrame], kind: Table) -> pd.DataFrame:

@@ -9,10 +9,12 @@ import re
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import NamedTuple
 
 from reports import colours
 from reports.atomic import write_bytes
+from reports.case_files import GOOD
 
 _WIRE = re.compile(rf"wire_({'|'.join(colours.WIRES)})_(\d+)\.(vtp|mrk\.json)")
 _DISPLAY = {"MarkupsCurve": "MarkupsDisplay"}  # of the others: their own name with "Display" behind it
@@ -31,12 +33,25 @@ class _Thing(NamedTuple):
     display: dict[str, str]
 
 
-def write_scene(folder: Path, shown: int, scans: Mapping[str, Path] | None = None, said: str = "") -> Path | None:
+def wire_name(kind: str, frame: int, status: str) -> str:
+    """What 3D Slicer calls a wire. status : of its frame, which is named where the wire counts in no score."""
+    refused = kind != "true" and status not in GOOD
+    return f"{kind} {frame:03d}" + f" (refused: {status})" * refused
+
+
+def write_scene(
+    folder: Path,
+    shown: int,
+    scans: Mapping[str, Path] | None = None,
+    said: str = "",
+    refused: Mapping[int, str] = MappingProxyType({}),
+) -> Path | None:
     """Write scene.mrml over the files of ``folder``, frame ``shown`` switched on; None where there is none of them.
 
     scans : by name, which 3D Slicer reads as they are.     said : what a reader of the scene should know of them.
+    refused : statuses of the frames that are not ok.
     """
-    things = list(_things(folder, shown))
+    things = list(_things(folder, shown, refused))
     if not things:
         return None
     root = ET.Element("MRML", version="Slicer5.0.0", userTags="")
@@ -61,7 +76,7 @@ def write_scene(folder: Path, shown: int, scans: Mapping[str, Path] | None = Non
     return path
 
 
-def _things(folder: Path, shown: int) -> Iterator[_Thing]:
+def _things(folder: Path, shown: int, refused: Mapping[int, str]) -> Iterator[_Thing]:
     files = sorted(path.name for path in folder.glob("[!.]*"))
     if "lumen.vtp" in files:
         glass = {"color": _triple(colours.LUMEN), "opacity": "0.3", "visibility": "true", "backfaceCulling": "false"}
@@ -73,12 +88,13 @@ def _things(folder: Path, shown: int) -> Iterator[_Thing]:
         if found := _WIRE.fullmatch(file):
             kind, frame, ending = found.groups()
             seen = "true" if int(frame) == shown and ending == "vtp" else "false"
+            name = wire_name(kind, int(frame), refused.get(int(frame), "ok"))
             look = {"color": _triple(colours.WIRES[kind]), "visibility": seen}
             if ending == "vtp":
-                yield _Thing("Model", "ModelStorage", f"{kind} {frame}", file, look | {"lineWidth": "4"})
+                yield _Thing("Model", "ModelStorage", name, file, look | {"lineWidth": "4"})
             else:
                 look["selectedColor"] = look["color"]
-                yield _Thing("MarkupsCurve", "MarkupsJsonStorage", f"{kind} {frame}, curve", file, look)
+                yield _Thing("MarkupsCurve", "MarkupsJsonStorage", f"{name}, curve", file, look)
 
 
 def _add(root: ET.Element, thing: _Thing, number: int) -> None:

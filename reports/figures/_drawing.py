@@ -33,6 +33,7 @@ ROOM_ABOVE = 0.06  # of the largest value: half a marker is 0.03 of a panel 1.5 
 _ERROR_COLOURS = LinearSegmentedColormap.from_list("error", (SIMULATED, FAR))  # the viewer's
 _COLOURS = LinearSegmentedColormap.from_list("sequential", SEQUENTIAL)
 _ERROR_TICKS_MM = (ERROR_SCALE_MM[0], 0.1, 0.5, ERROR_SCALE_MM[1])  # no more: the bar beside two cases is an inch high
+LONGEST_NAME = 32  # letters of a name that is drawn: 100, which are allowed, left an inch to the cells beside them
 _GREYS = 52  # finer than the noise of any scan worth a picture
 
 
@@ -107,6 +108,11 @@ def lattice(
     for axes in panels[count:]:
         axes.remove()
     return figure, panels[:count]
+
+
+def drawn_name(name: str) -> str:
+    """A case's name as it is drawn: of a long one its beginning and end, where those of one study differ."""
+    return name if len(name) <= LONGEST_NAME else f"{name[: LONGEST_NAME - 13]}\u2026{name[-12:]}"
 
 
 def plain(axes: Axes) -> None:

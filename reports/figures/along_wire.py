@@ -7,7 +7,8 @@ import pandas as pd
 from matplotlib.colors import ListedColormap, Normalize
 from scipy.interpolate import interp1d
 
-from reports.case_files import CaseFiles
+from reports.case_files import GOOD, CaseFiles
+from reports.colours import BAD
 from reports.figures._drawing import Drawing, FrameAxis, error_scale, heat_map, new_figure, whole_numbers
 from reports.tables import has
 
@@ -38,8 +39,11 @@ def contact_along_wire(case: CaseFiles) -> Drawing | None:
     drawing = _along_wire(points, "contact_force_N", "contact force, N", scale, zero=_NO_FORCE)
     if drawing is None:
         return None
-    # the wires of refused frames are shown, too
+    # the wires of refused frames are shown, too: with the cross that the map of a run has for such a frame
     status = drawing.table["frame"].map(case.errors.set_index("frame")["status"])
+    refused = drawing.table["frame"][~status.isin(GOOD)].unique()
+    if len(refused):
+        drawing.figure.axes[0].plot(0.0 * refused, refused, "x", color=BAD, markersize=7, clip_on=False, zorder=5)
     return replace(drawing, table=drawing.table.assign(status=status))
 
 

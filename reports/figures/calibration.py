@@ -11,6 +11,7 @@ from reports.colours import SIMULATED
 from reports.figures._drawing import (
     LOG_FROM_RATIO,
     Drawing,
+    drawn_name,
     lattice,
     legend,
     new_figure,
@@ -112,7 +113,7 @@ def residuals(record: Mapping[str, Any]) -> Drawing | None:
             axes.plot(own["frame"], own[column], color=colour, marker="o", markersize=3.5, linewidth=1.0, label=label)
         light = own[own["weight"] < _LIGHT]
         axes.plot(light["frame"], light["after_mm"], "o", markersize=5, markerfacecolor="white", color=SIMULATED)
-        axes.set_title(str(case), fontsize=9)
+        axes.set_title(drawn_name(str(case)), fontsize=9)
         axes.set_xlabel("frame")
         whole_numbers(axes.xaxis)
         plain(axes)

@@ -11,7 +11,16 @@ from numpy.typing import NDArray
 
 from reports.case_files import GOOD
 from reports.colours import BAD, SIMULATED
-from reports.figures._drawing import Drawing, error_scale, heat_map, legend, new_figure, plain, whole_numbers
+from reports.figures._drawing import (
+    Drawing,
+    drawn_name,
+    error_scale,
+    heat_map,
+    legend,
+    new_figure,
+    plain,
+    whole_numbers,
+)
 from reports.figures._style import GREY, Look, predictors
 from reports.tables import has
 
@@ -99,11 +108,11 @@ def cases_by_error(run: RunFiles) -> Drawing | None:
 
 
 def _tall(names: Sequence[str]) -> tuple[Figure, Axes]:
-    """A figure with one named row per case, the first at the top."""
+    """A figure with one named row per case, the first at the top; the table beside it has the names whole."""
     figure = new_figure(float(np.clip(1.3 + 0.24 * len(names), 2.2, _MAX_INCH)))
     axes = figure.subplots()
     every = -(-len(names) // _MAX_NAMES)
-    axes.set_yticks(range(0, len(names), every), names[::every], fontsize=8)
+    axes.set_yticks(range(0, len(names), every), [*map(drawn_name, names[::every])], fontsize=8)
     axes.set_ylim(len(names) - 0.5, -0.5)
     axes.tick_params(axis="x", labeltop=len(names) >= _TOP_TICKS_FROM)
     return figure, axes

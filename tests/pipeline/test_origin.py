@@ -67,6 +67,30 @@ def test_every_input_of_a_run_is_held_against_the_other_s(study: Path, tmp_path:
     assert differing(study, tmp_path) == {"input of a, b: frames[0]", "input of a, b: truth"}
 
 
+def test_every_key_of_a_case_is_held_against_the_other_s(study: Path, tmp_path: Path) -> None:
+    """Of these none was kept, and each changes what is computed: two hashes of the manifest stood there."""
+    run(study, tmp_path / "before")
+    manifest = study / "manifest.toml"
+    keys = {"entry_sigma_mm": "3.2", "entry_direction_sigma_deg": "12.0", "lumen_seed_mm": "[[0.0, 0.0, 20.0]]"}
+    keys |= {"insertion_sigma_mm": "0.01", "roll_sigma_deg": "0.7", "uncertainty.friction": "0.02"}
+    stated = "".join(f"{key} = {value}\n" for key, value in keys.items())
+    text = manifest.read_text(encoding="utf-8")
+    manifest.write_text(text.replace('id = "a"\n', f'id = "a"\n{stated}'), encoding="utf-8")
+    told = {f"[[case]] {key}" for key in keys} - {"[[case]] uncertainty.friction"} | {"[case.uncertainty] friction"}
+    assert differing(study, tmp_path) == {f"manifest of a: {key}" for key in told} | {"manifest"}
+    held = json.loads((tmp_path / "after" / "cases" / "a" / "result.json").read_text(encoding="utf-8"))["manifest_keys"]
+    assert (held["entry_sigma_mm"], held["push_force_sigma_N"]) == (3.2, 0.001), "a default, too"
+    assert "as_stated" not in held, "none of the manifest's"
+
+
+def test_what_is_stated_of_files_beside_their_places_is_kept(study: Path) -> None:
+    case = read_manifest(study / "manifest.toml").cases[0]
+    assert "frames" not in inputs.keys_of(case)
+    frames, lumen = [Source(Path("a.h5"), "scan", 0), Source(Path("b.h5"))], Mask(Path("l.nrrd"), label=2)
+    held = inputs.keys_of(case.model_copy(update={"frames": tuple(frames), "lumen": lumen}))
+    assert (held["frames"], held["lumen"]) == ([{"dataset": "scan", "item": 0}, {}], [{"label": 2}])
+
+
 def test_the_wires_of_another_simulator_are_one_input(study: Path, tmp_path: Path) -> None:
     """Every file's hash stood before the verdict on two simulators."""
     run(study, tmp_path / "before")

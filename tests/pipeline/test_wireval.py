@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import json
 import os
+import pickle
 import re
 import subprocess
 import sys
+from copy import copy
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,10 +17,16 @@ import pytest
 
 import wireval
 from pipeline.cli import main
+from pipeline.load.geometry import LoadError
 from pipeline.run.provenance import package_version
+from pipeline.status import FrameStatus
+from pipeline.study.manifest import ManifestError
+from reports.atomic import WriteError
 from reports.case_files import read_case
 from reports.sweep import UNCHANGED
+from reports.texts import UnreadableError
 from tests.pipeline.known_study import run_known, write_csv
+from tests.reports.fake_results import FakeCase, write_run
 
 
 @pytest.fixture(scope="module")
@@ -67,12 +75,24 @@ def test_a_notebook_s_backend_is_its_own(named: str, left: str) -> None:
 
 
 def test_a_check_gives_sentences(study: Path, tmp_path: Path) -> None:
-    assert wireval.check(study) == []
+    with pytest.warns(UserWarning, match="less than half a voxel"):
+        assert wireval.check(study) == []
     assert wireval.check(tmp_path / "none.toml") == [f"{tmp_path / 'none.toml'}: no such manifest"]
     assert "expected a number from 0.01 to 20" in wireval.check(study, settings={"solver.segment_mm": -1})[0]
     nested = {"solver": {"segment_mm": 0.5}}
     assert wireval.check(study, settings=nested) == ['settings: write {"solver.segment_mm": 0.5}']
     assert wireval.check(tmp_path)[0].endswith("here or in frames/"), "a folder without scans"
+
+
+def test_a_check_warns_of_what_is_not_plausible(study: Path, tmp_path: Path) -> None:
+    """It was printed, and [] told a script that nothing is wrong."""
+    text = (study / "manifest.toml").read_text(encoding="utf-8")
+    for name in ("reference.mha", "frames", "truth.json"):
+        (tmp_path / name).symlink_to(study / name)
+    thick = re.sub(r"\nradius_mm = .*", "\nradius_mm = 1.5", text)
+    (tmp_path / "manifest.toml").write_text(thick, encoding="utf-8")
+    with pytest.warns(UserWarning, match="radius_mm"):
+        assert wireval.check(tmp_path) == []
 
 
 OTHER_KINDS = [None, 3, 1.5, True, [3], {3: 4}, {"a": 3}, "", b"x", "a\0b", object(), (1, 2), float("nan"), "x" * 5000]
@@ -108,6 +128,10 @@ def test_an_argument_of_another_kind_is_refused_by_name(
     [
         ({"sweep": 3}, 'sweep: got 3; expected a mapping to lists of values, {"simulate.wall_scale": [0.5, 2]}'),
         ({"fail_if": 3}, 'fail_if: got 3; expected a condition as text, "rms_mm>0.5", or a list of such'),
+        ({"sweep": {"simulate.wall_scale": "0.5,2"}}, "sweep: got {'simulate.wall_scale': '0.5,2'}; expected"),
+        ({"quiet": "yes"}, "quiet: got 'yes'; expected True or False"),
+        ({"fresh": 1}, "fresh: got 1; expected True or False"),
+        ({"embed": "no"}, "embed: got 'no'; expected True or False"),
         ({"out": b"out"}, "out: got b'out'; expected a path, as text or pathlib.Path"),
         ({"manifest": "a\0b"}, "manifest: a\0b: cannot be opened (the name holds a zero byte)"),
     ],
@@ -124,7 +148,9 @@ def test_a_run_gives_frames(study: Path, tmp_path: Path) -> None:
     kept = {"settings": {"solver.segment_mm": 2.0, "compare.simulated_nulls": False}, "quiet": True, "until": "compare"}
     results = wireval.run(study, tmp_path / "out", sweep=wall, **kept)
     assert results.ok
-    typed = json.loads((tmp_path / "out" / "provenance.json").read_text(encoding="utf-8"))["argv"]
+    begun = json.loads((tmp_path / "out" / "provenance.json").read_text(encoding="utf-8"))
+    assert begun["cwd"] == str(Path.cwd()), "paths in argv may be relative"
+    typed = begun["argv"]
     assert typed[:3] == ["wireval", "run", str(study)], "the next command names what was called"
     assert list(results.errors["case"]) == ["straight"] * 2
     assert list(results.sweep["parameter"]) == [UNCHANGED, "simulate.wall_scale"]
@@ -147,7 +173,7 @@ def test_a_run_gives_frames(study: Path, tmp_path: Path) -> None:
     assert len(repr(results).splitlines()) < 13
     assert len(repr(results)) < 1000
     assert re.fullmatch(r"\{'straight': CaseFiles\('.*/straight', ok, 2 frames\)\}", repr(results.cases))
-    assert re.match(r"FrameArrays\(frame 1, traced_mm \(\d+, 3\), ", repr(results.cases["straight"].read_frame(1)))
+    assert re.match(r"FrameArrays\(frame 1, ok, traced_mm \(\d+, 3\), ", repr(results.cases["straight"].read_frame(1)))
     assert wireval.read_results(tmp_path / "out").errors.equals(results.errors)
     assert replayed_mm(results.cases["straight"]) < 0.08, "0.1 voxel; there was no way from a run to its wall"
     changed, settings = results.cases["straight"], results.cases["straight"].result["config"]["simulate"]
@@ -200,6 +226,23 @@ def test_a_run_gives_frames(study: Path, tmp_path: Path) -> None:
     assert not (tmp_path / "out" / "gates.json").exists()
 
 
+def test_results_are_of_their_folder_wherever_the_script_goes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """After a chdir the tables were empty, or those of another run whose folder has the same name."""
+    for name in ("a", "b"):
+        write_run(tmp_path / name / "out", [FakeCase("c", frames=1 + (name == "b"))])
+    monkeypatch.chdir(tmp_path / "a")
+    with pytest.warns(UserWarning, match="ledger.json is missing"):
+        results = wireval.read_results("out")
+    monkeypatch.chdir(tmp_path / "b")
+    case = results.cases["c"]
+    assert set(case.points["frame"]) == {0}, "b has two"
+    assert results.out == case.folder.parents[1] == tmp_path / "a" / "out"
+    for name, read in (("points.csv.gz", lambda: case.points), ("frames.h5", lambda: case.read_frame(0))):
+        (case.folder / name).unlink()
+        with pytest.raises(ValueError, match=f"a/out/cases/c/{re.escape(name)}: no such file, though the case had one"):
+            read()
+
+
 def replayed_mm(case: wireval.CaseFiles) -> float:
     """How far the solver alone lays the wire in the case's wall from where the run laid it, rms of the worst frame."""
     held, stated, rows = case.result["entry"], case.result["wire"], case.errors
@@ -240,6 +283,24 @@ def test_verbs_are_called_as_they_are_typed(monkeypatch: pytest.MonkeyPatch, tmp
     monkeypatch.setattr(wireval, "carried_out", lambda args: 2)
     with pytest.raises(wireval.InputError, match="nothing was run"):
         wireval.calibrate("m.toml", tmp_path)
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        wireval.InputError(["one", "two"]),
+        ManifestError(["one", "two"], sound=["a case"]),  # type: ignore[list-item]
+        wireval.StageError(FrameStatus.SEGMENT_FAILED, "grey: got 1"),
+        LoadError("a.mha: got 1"),
+        UnreadableError("a.mha: got 1"),
+        WriteError("a.mha: no room"),
+    ],
+)
+def test_errors_come_whole_out_of_another_process(error: Exception) -> None:
+    """Problems were split into letters, and a StageError broke the pool of its process."""
+    found = pickle.loads(pickle.dumps(error))
+    assert (type(found), str(found), vars(found)) == (type(error), str(error), vars(error))
+    assert copy(error).args == error.args
 
 
 def test_what_cannot_be_used_is_raised(study: Path, tmp_path: Path) -> None:
@@ -299,6 +360,12 @@ def test_what_synth_cannot_do_is_in_its_error(tmp_path: Path) -> None:
     """It was "the problems stand above", which a notebook does not show."""
     with pytest.raises(wireval.InputError, match="frames: got 0; allowed: 1 or more"):
         wireval.synth("bend", tmp_path / "study", frames=0)
+
+
+def test_what_synth_prints_is_no_study(tmp_path: Path) -> None:
+    """It returned the path of a manifest that is not there."""
+    with pytest.raises(wireval.InputError, match="list: it writes no study; `wireval synth --list` names the scenes"):
+        wireval.synth("straight", tmp_path / "study", list=True)
 
 
 def test_settings_may_be_numbers_of_numpy(tmp_path: Path) -> None:

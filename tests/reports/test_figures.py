@@ -206,6 +206,26 @@ def test_a_table_of_forces_tells_refused_frames_from_others(tmp_path: Path) -> N
     drawing = draw(CASE_FIGURES["contact_along_wire"], replace(case, samples=forces, errors=errors))
     told = {*zip(drawing.table["frame"], drawing.table["status"], strict=True)}
     assert told == {(0, "ok"), (2, "no_wire")}
+    (crosses,) = drawing.figure.axes[0].lines
+    assert list(crosses.get_ydata()) == [2], "the wire of a refused frame was drawn as any other"
+
+
+def test_long_names_leave_room_for_what_is_drawn(tmp_path: Path) -> None:
+    """Ids of 100 letters left the cells an inch, in which their numbers overlapped, and cut the colour bar's label."""
+    names = ["a" * 100, "b" * 99 + "c"]
+    out = write_run(tmp_path, [FakeCase(name, frames=3) for name in names])
+    errors = {name: read_case(out / "cases" / name).errors for name in names}
+    run = RunFiles(errors, tables.read(out / "summary.csv", SUMMARY), tables.read_if_there(None, SWEEP))
+    drawing = RUN_FIGURES["case_frame_map"](run)
+    assert drawing is not None
+    drawing.figure.canvas.draw()
+    cells, bar = drawing.figure.axes
+    assert cells.get_position().width > 0.5
+    assert [one.get_text()[-2:] for one in cells.get_yticklabels()] == ["aa", "bc"]
+    edge = drawing.figure.bbox
+    assert bar.yaxis.label.get_window_extent().y0 >= edge.y0
+    assert bar.yaxis.label.get_window_extent().y1 <= edge.y1
+    assert set(drawing.table["case"]) == set(names), "whole in the table beside it"
 
 
 def test_heat_map_shows_each_sample_at_its_place(tmp_path: Path) -> None:
@@ -494,11 +514,13 @@ def test_frames_file_reads_back(tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
     scan = ScanCrop(np.array([0.3, 0.4, 0.5]), rng.normal(size=3), TURN, (4, 5, 6), {1: np.eye(4, 6, dtype=np.uint8)})
     curve, picture = rng.normal(size=(7, 3)), rng.integers(0, 255, (5, 6), dtype=np.uint8)
-    frames = (FrameArrays(n, traced_mm=curve + n, contact_force_N=curve, mips={0: picture}) for n in (11, 2))
+    arrays = {"contact_force_N": curve, "mips": {0: picture}, "status": "trace_low_contrast"}
+    frames = (FrameArrays(n, traced_mm=curve + n, **arrays) for n in (11, 2))
     write_frames(tmp_path / "frames.h5", scan, frames)
     back = read_scan(tmp_path / "frames.h5")
     assert back is not None
     assert (back.shape, list(back.lumen_mips)) == ((4, 5, 6), [1])
+    assert repr(back).startswith("ScanCrop((4, 5, 6), voxels of 0.3 x 0.4 x 0.5 mm, origin ["), "a dump of its pictures"
     np.testing.assert_array_equal(back.direction, TURN)
     np.testing.assert_allclose(back.to_index(scan.origin_mm + TURN @ (scan.spacing_mm * [1, 2, 3])), [1, 2, 3])
     assert frame_numbers(tmp_path / "frames.h5") == (2, 11)
@@ -506,6 +528,10 @@ def test_frames_file_reads_back(tmp_path: Path) -> None:
     np.testing.assert_array_equal(frame.traced_mm, curve + 11)
     np.testing.assert_array_equal(frame.mips[0], picture)
     assert frame.simulated_mm is None
+    assert repr(frame).startswith("FrameArrays(frame 11, trace_low_contrast, traced_mm (7, 3)"), "a wire like any other"
+    with h5py.File(tmp_path / "frames.h5", "r+") as file:
+        del file["frames/011"].attrs["status"]
+    assert read_frame(tmp_path / "frames.h5", 11).status == "", "of an older version"
 
 
 def test_every_dataset_of_a_frames_file_says_its_unit(tmp_path: Path) -> None:

@@ -490,6 +490,13 @@ def test_a_refusal_says_how_to_write_it(call: Callable[..., Any], arguments: dic
         call(**arguments)
 
 
+def test_a_wall_in_a_message_is_no_dump_of_its_distances() -> None:
+    with pytest.raises(ValueError, match="wire: got VesselWall") as error:
+        Insertion(WALL, WALL, entry_mm=[0, 0, 0], entry_direction=[0, 0, 1])  # type: ignore[arg-type]
+    grid = "Grid(float64 (3, 4, 5), voxels of 1 x 1 x 1 mm)"
+    assert f"got VesselWall(1 N/mm2, friction 0, offset, {grid}); allowed: a GuideWire" in str(error.value)
+
+
 @pytest.mark.parametrize("lumen", [0.25, 0.5, 2.0])
 @pytest.mark.parametrize("noise", [0.0, 0.1])
 def test_a_distance_in_mm_is_not_however_thin_the_lumen_or_rough_its_wall(lumen: float, noise: float) -> None:
