@@ -226,6 +226,7 @@ def test_pooled_errors_of_both_are_over_the_same_frames(
     assert "WORSE" in said
     assert "case b, case present -> missing" in said
     assert "Over the cases of both" not in said, "which have the same errors, and as many frames"
+    assert "frames_ok" not in said
 
 
 def test_runs_without_a_case_in_common_have_no_number_over_the_frames_of_both(
