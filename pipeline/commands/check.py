@@ -15,10 +15,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def main(args: argparse.Namespace) -> int:
-    """Exit 0 when nothing is wrong, with what is assumed; raises InputError with every problem.
-
-    What is doubtful is left in ``args.doubts``: Python warns of it.
-    """
+    """Exit 0 when nothing is wrong, with what is assumed; raises InputError with every problem."""
     from pipeline.status import InputError
     from pipeline.study.check import check, frames_of
     from pipeline.study.manifest import ManifestError
@@ -35,8 +32,7 @@ def main(args: argparse.Namespace) -> int:
         raise InputError(problems)
     for note in assumed_in(manifest.cases):
         say(f"assumed, not confirmed: {note}")
-    args.doubts = list(doubts(manifest.cases, config))
-    for note in args.doubts:
+    for note in doubts(manifest.cases, config):
         say(f"warning: {note}")
     frames = sum(frames_of(case, config) for case in manifest.cases)
     say(f"{args.manifest}: {counted(len(manifest.cases), 'case')}, {counted(frames, 'frame')}: no problem found")

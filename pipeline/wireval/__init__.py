@@ -18,12 +18,9 @@ found raises ``StageError``; both say what the command would print.
 
 import json
 import sys
-import warnings
-from argparse import Namespace
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 from . import _own_packages  # noqa: F401 - first: it says what is in the way of the imports below
 
@@ -39,7 +36,7 @@ from reports.texts import UnreadableError
 from reports.two_runs import Verdict
 from solver import Catheter, Grid, GuideWire, Insertion, Insertions, Snap, Solution, Status, VesselWall, relax
 
-from ._arguments import require, require_truth
+from ._arguments import require, require_truth, typed
 from .results import Results, read_results, read_run, wall_of
 
 __version__ = package_version()
@@ -88,28 +85,25 @@ def synth(scene: str, out: Place, **more: bool | float | str) -> Path:
 
     more : options of ``wireval synth``, such as ``frames=8`` or ``seed=3``.
     """
-    require(scene=scene, out=out)
+    given = require(scene=scene, out=out)
     if "list" in more:
         raise InputError(["list: it writes no study; `wireval synth --list` names the scenes, on the command line"])
-    _carried_out("synth", scene, out=out, **more)
-    return Path(out) / "manifest.toml"
+    _carried_out("synth", given["scene"], out=given["out"], **more)
+    return Path(given["out"]) / "manifest.toml"
 
 
 def check(manifest: Place, *, settings: Settings | None = None) -> list[str]:
     """Every problem of a manifest, or of a folder of scans, as one sentence each; empty if none is found.
 
     Only the headers of scans are read, not their voxels, unless a manifest has to be inferred from a folder of scans.
-    Warns (UserWarning) of what is allowed and not plausible; what is assumed is printed.
+    What is assumed, and what is allowed and not plausible, is printed, as ``run`` does it.
     """
     try:
-        require(manifest=manifest)
-        found = _carried_out("check", manifest, settings=settings)
+        _carried_out("check", require(manifest=manifest)["manifest"], settings=settings)
     except InputError as error:
         return list(error.problems)
     except StageError as error:
         return [str(error)]
-    for doubt in found.doubts:
-        warnings.warn(doubt, stacklevel=2)
     return []
 
 
@@ -119,8 +113,8 @@ def run(
     *,
     settings: Settings | None = None,
     jobs: int = 1,
-    sweep: Mapping[str, Sequence[object]] | None = None,
-    fail_if: str | Sequence[str] = (),
+    sweep: Mapping[str, Iterable[object]] | None = None,
+    fail_if: str | Iterable[str] = (),
     **more: bool | str | Sequence[str],
 ) -> Results:
     """Run the whole pipeline over every case of a manifest (or of a folder of scans) and return the results.
@@ -136,19 +130,18 @@ def run(
     folder keeps the cases that are finished. A shard without any case writes no files, and its tables are empty.
     Raises InputError where nothing could be run.
     """
-    require(manifest=manifest, out=out, sweep=sweep or {}, fail_if=fail_if)
-    points = [f"{name}={','.join(map(str, values))}" for name, values in (sweep or {}).items()]
-    gates = [fail_if] if isinstance(fail_if, str) else list(fail_if)
-    _carried_out("run", manifest, out=out, settings=settings, jobs=jobs, sweep=points, fail_if=gates, **more)
-    return read_run(Path(out))
+    given = require(manifest=manifest, out=out, sweep=sweep, fail_if=fail_if)
+    given["sweep"] = [f"{name}={','.join(map(str, values))}" for name, values in (given["sweep"] or {}).items()]
+    _carried_out("run", given.pop("manifest"), settings, jobs=jobs, **given, **more)
+    return read_run(Path(given["out"]))
 
 
 def score(
     manifest: Place,
     out: Place,
-    curves: Place | Sequence[Place] | Mapping[str, Place],
+    curves: Place | Iterable[Place] | Mapping[str, Place],
     *,
-    fail_if: str | Sequence[str] = (),
+    fail_if: str | Iterable[str] = (),
     **more: bool | int | str | Settings,
 ) -> Results:
     """Compare the wires of other simulators with the traced ones, and return the results of the first simulator.
@@ -158,12 +151,9 @@ def score(
     more : options of ``wireval score``.
     For the results of another simulator: ``read_results(out / "simulators" / NAME)``.
     """
-    require(manifest=manifest, out=out, curves=curves, fail_if=fail_if)
-    gates = [fail_if] if isinstance(fail_if, str) else list(fail_if)
-    named = [f"{name}={place}" for name, place in curves.items()] if isinstance(curves, Mapping) else curves
-    curves = [named] if isinstance(named, (str, Path)) else list(named)
-    _carried_out("score", manifest, out=out, curves=curves, fail_if=gates, **more)
-    return read_results(out)
+    given = require(manifest=manifest, out=out, curves=curves, fail_if=fail_if)
+    _carried_out("score", given.pop("manifest"), **given, **more)
+    return read_results(given["out"])
 
 
 def calibrate(manifest: Place, out: Place, **more: bool | Settings) -> Path:
@@ -171,9 +161,9 @@ def calibrate(manifest: Place, out: Place, **more: bool | Settings) -> Path:
 
     more : options of ``wireval calibrate``.
     """
-    require(manifest=manifest, out=out)
-    _carried_out("calibrate", manifest, out=out, **more)
-    return Path(out) / "parameters.toml"
+    given = require(manifest=manifest, out=out)
+    _carried_out("calibrate", given["manifest"], out=given["out"], **more)
+    return Path(given["out"]) / "parameters.toml"
 
 
 def diff(first: Place, second: Place, *, tolerance: Place | None = None) -> Verdict:
@@ -183,23 +173,19 @@ def diff(first: Place, second: Place, *, tolerance: Place | None = None) -> Verd
     ``share`` says by which share of the first value, where that is more. By default the one installed with wireval.
     Raises InputError where the two cannot be compared.
     """
-    require(first=first, second=second, **({} if tolerance is None else {"tolerance": tolerance}))
+    given = require(first=first, second=second, tolerance=tolerance)
+    least = None if tolerance is None else Path(given["tolerance"])
     try:
-        return compared(Path(first), Path(second), None if tolerance is None else Path(tolerance))
+        return compared(Path(given["first"]), Path(given["second"]), least)
     except (ValueError, OSError) as error:
         raise InputError([str(error)]) from None
 
 
-def _carried_out(verb: str, manifest: Place, settings: object = None, **options: object) -> Namespace:
-    """Carry out the verb as typed with these options, and return what was parsed, with what the verb has left there.
-
-    A list repeats its option, True stands for one alone.
-    """
-    words = [verb, str(manifest)]
+def _carried_out(verb: str, manifest: str, settings: object = None, **options: object) -> None:
+    """Carry out the verb as typed with these options. A list repeats its option, True stands for one alone."""
+    words = [verb, manifest]
     require_truth(verb, options)
-    chosen: Any = {} if settings is None else settings
-    require(settings=chosen)
-    for key, wanted in chosen.items():
+    for key, wanted in (require(settings=settings, jobs=options.get("jobs"))["settings"] or {}).items():
         if isinstance(wanted, Mapping):
             flat = {f"{key}.{name}": value for name, value in wanted.items()}
             raise InputError([f"settings: write {json.dumps(flat, default=str)}"])
@@ -207,18 +193,18 @@ def _carried_out(verb: str, manifest: Place, settings: object = None, **options:
     for name, value in options.items():
         for one in value if isinstance(value, (list, tuple)) else [value]:
             if one is not None and one is not False:
-                words += [f"--{name.replace('_', '-')}"] + [str(one)] * (one is not True)
-    with _typed(words):
+                words += [f"--{name.replace('_', '-')}"] + [typed(name, one)] * (one is not True)
+    with _as_typed(words):
         try:
             args = parsed(words)
+        except SystemExit:
+            raise InputError([f"help: of the command line alone; see help(wireval.{verb})"]) from None
+        try:
             code = carried_out(args)
         except UnreadableError as error:
             raise InputError([str(error)]) from None
-        except SystemExit:
-            raise InputError([f"help, print_completion: of the command line alone; see help(wireval.{verb})"]) from None
     if code == BAD_INPUT:
         raise InputError([f"wireval {verb}: nothing was run; the problems stand above"])
-    return args
 
 
 def _plain(value: object) -> object:
@@ -227,7 +213,7 @@ def _plain(value: object) -> object:
 
 
 @contextmanager
-def _typed(words: Sequence[str]) -> Iterator[None]:
+def _as_typed(words: Sequence[str]) -> Iterator[None]:
     """Provenance of the output, also of worker processes, and the next command in it name what was called."""
     before, sys.argv = sys.argv, ["wireval", *words]
     try:

@@ -1,9 +1,10 @@
-"""Of which kind arguments of a verb may be: one of another kind is refused by its name, before anything is done."""
+"""What arguments of a verb may be: one of another kind is refused by its name, before anything is done."""
 
-from collections.abc import Callable, Collection, Mapping
-from os import PathLike
+import os
+from collections.abc import Callable, Mapping
+from numbers import Integral
 from pathlib import Path
-from typing import TypeGuard
+from typing import Any
 
 from pipeline.cli import parsers
 from pipeline.status import InputError
@@ -12,60 +13,105 @@ from reports.case_files import CaseFiles
 from reports.texts import UnreadableError, status_of
 
 
-def _is_place(value: object) -> bool:
-    """Whether it is a path; UnreadableError for a name that no file can have."""
-    if isinstance(value, (str, PathLike)) and str(value):
-        status_of(Path(value))
-        return True
-    return False
+def _text(value: object) -> str | None:
+    return value if isinstance(value, str) and value else None
 
 
-def _are_places(value: object) -> bool:
-    """Whether it is a path, a list of them, or paths by name."""
+def _place(value: Any) -> str | None:
+    """A path as text; UnreadableError for a name that no file can have."""
+    try:
+        name = _text(os.fspath(value))
+    except TypeError:
+        return None
+    if name is not None:
+        status_of(Path(name))
+    return name
+
+
+def _list(value: Any) -> list[Any] | None:
+    """What can be gone through and is no text, gone through once: a generator has its values no second time."""
+    if isinstance(value, (str, bytes, Mapping)):
+        return None
+    try:
+        each = iter(value)
+    except TypeError:
+        return None
+    return list(each)
+
+
+def _whole(found: list[Any | None]) -> list[Any] | None:
+    """All of these, None where one of them is."""
+    return None if None in found else found
+
+
+def _conditions(value: object) -> list[str] | None:
+    listed = [value] if isinstance(value, str) else _list(value)
+    return None if listed is None else _whole([_text(one) for one in listed])
+
+
+def _curves(value: object) -> list[str] | None:
+    """As --curves takes them: "NAME=FOLDER", or a path alone."""
     if isinstance(value, Mapping):
-        return all(isinstance(name, str) and _is_place(place) for name, place in value.items())
-    return isinstance(value, str) or _is_place(value) or _are_words(value, (str, PathLike))
+        pairs = [(_text(name), _place(place)) for name, place in value.items()]
+        return None if any(None in pair for pair in pairs) else [f"{name}={place}" for name, place in pairs]
+    listed = [value] if isinstance(value, (str, os.PathLike)) else _list(value)
+    return None if listed is None else _whole([_text(one) or _place(one) for one in listed])
 
 
-def _is_list(value: object) -> TypeGuard[Collection[object]]:
-    return isinstance(value, Collection) and not isinstance(value, (str, bytes, Mapping))
+def _values(value: object) -> dict[str | None, list[Any] | None] | None:
+    """Lists of values by the keys of settings."""
+    if not isinstance(value, Mapping):
+        return None
+    found = {_text(name): _list(values) for name, values in value.items()}
+    return None if None in found or None in found.values() else found
 
 
-def _are_words(value: object, of: type | tuple[type, ...] = str) -> bool:
-    """Whether it is text, or a list of such."""
-    return isinstance(value, str) or (_is_list(value) and all(isinstance(one, of) for one in value))
+def _count(value: Any) -> int | None:
+    """A whole number, numpy's too; True is none."""
+    return int(value) if isinstance(value, Integral) and value is not True and int(value) >= 1 else None
 
 
-def _are_values(value: object) -> bool:
-    """Whether it is lists of values by the keys of settings."""
-    return isinstance(value, Mapping) and all(isinstance(k, str) and _is_list(v) for k, v in value.items())
-
-
-PLACE = _is_place, "a path, as text or pathlib.Path"
-ALLOWED: dict[str, tuple[Callable[[object], bool], str]] = {
-    "scene": (lambda value: isinstance(value, str), "the name of a scene, as text"),
+PLACE = _place, "a path, as text or pathlib.Path"
+ALLOWED: dict[str, tuple[Callable[[object], Any], str]] = {
+    "scene": (_text, "the name of a scene, as text"),
     **dict.fromkeys(("manifest", "out", "first", "second", "tolerance"), PLACE),
     "settings": (
-        lambda value: isinstance(value, Mapping),
+        lambda value: value if isinstance(value, Mapping) else None,
         'a mapping, {"segment.threshold": 0.5}, with the keys that --set takes',
     ),
-    "sweep": (_are_values, 'a mapping to lists of values, {"simulate.wall_scale": [0.5, 2]}'),
-    "fail_if": (_are_words, 'a condition as text, "rms_mm>0.5", or a list of such'),
-    "curves": (_are_places, '"NAME=FOLDER" or a path, a list of these, or {"NAME": FOLDER}'),
-    "case": (lambda value: isinstance(value, CaseFiles), 'a case of the results, results.cases["ID"]'),
+    "jobs": (_count, "a whole number from 1 on"),
+    "sweep": (_values, 'a mapping to lists of values, {"simulate.wall_scale": [0.5, 2]}'),
+    "fail_if": (_conditions, 'a condition as text, "rms_mm>0.5", or a list of such'),
+    "curves": (_curves, '"NAME=FOLDER" or a path, a list of these, or {"NAME": FOLDER}'),
+    "case": (
+        lambda value: value if isinstance(value, CaseFiles) else None,
+        'a case of the results, results.cases["ID"]',
+    ),
 }
-"""By the name of an argument: which values it may have, and these in words."""
+"""By the name of an argument: what its value is taken as, None for one that it may not have, and these in words."""
+OPTIONAL = "settings", "jobs", "sweep", "tolerance"
+"""None is their default."""
 
 
-def require(**given: object) -> None:
-    """Raise InputError for the first argument of a kind that it may not be, or a name that no file can have."""
-    for name, value in given.items():
-        fits, expected = ALLOWED[name]
-        try:
-            if not fits(value):
-                raise InputError([f"{name}: got {shortened(repr(value), 80)}; expected {expected}"])
-        except UnreadableError as error:
-            raise InputError([f"{name}: {error}"]) from None
+def require(**given: object) -> dict[str, Any]:
+    """The arguments as they are taken: paths as text, and lists of what can be gone through.
+
+    Raises InputError for the first of a kind that it may not be, or a name that no file can have.
+    """
+    return {
+        name: None if value is None and name in OPTIONAL else _taken(name, value, *ALLOWED[name])
+        for name, value in given.items()
+    }
+
+
+def _taken(name: str, value: object, take: Callable[[object], Any], expected: str) -> Any:
+    try:
+        found = take(value)
+    except UnreadableError as error:
+        raise InputError([f"{name}: {error}"]) from None
+    if found is None:
+        raise InputError([f"{name}: got {shortened(repr(value), 80)}; expected {expected}"])
+    return found
 
 
 def require_truth(verb: str, options: Mapping[str, object]) -> None:
@@ -78,3 +124,8 @@ def require_truth(verb: str, options: Mapping[str, object]) -> None:
         action = known.get(f"--{name.replace('_', '-')}")
         if action is not None and action.nargs == 0 and not (value is None or isinstance(value, bool)):
             raise InputError([f"{name}: got {shortened(repr(value), 80)}; expected True or False"])
+
+
+def typed(name: str, value: object) -> str:
+    """The value of an option as it is typed; InputError for a path that is no text."""
+    return str(_taken(name, value, *PLACE) if isinstance(value, (os.PathLike, bytes)) else value)

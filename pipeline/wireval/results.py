@@ -112,8 +112,7 @@ def read_results(out: str | Path) -> Results:
 
     Warns of cases whose files have changed since they were written, and of tables that belong to other cases.
     """
-    require(out=out)
-    out = Path(out)
+    out = Path(require(out=out)["out"])
     if not out.is_dir():
         raise InputError([f"{out}: no such folder; give one that `wireval run` wrote"])
     try:

@@ -13,6 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import wireval
@@ -27,6 +28,7 @@ from reports.sweep import UNCHANGED
 from reports.texts import UnreadableError
 from tests.pipeline.known_study import run_known, write_csv
 from tests.reports.fake_results import FakeCase, write_run
+from wireval._arguments import ALLOWED, require
 
 
 @pytest.fixture(scope="module")
@@ -75,8 +77,7 @@ def test_a_notebook_s_backend_is_its_own(named: str, left: str) -> None:
 
 
 def test_a_check_gives_sentences(study: Path, tmp_path: Path) -> None:
-    with pytest.warns(UserWarning, match="less than half a voxel"):
-        assert wireval.check(study) == []
+    assert wireval.check(study) == []
     assert wireval.check(tmp_path / "none.toml") == [f"{tmp_path / 'none.toml'}: no such manifest"]
     assert "expected a number from 0.01 to 20" in wireval.check(study, settings={"solver.segment_mm": -1})[0]
     nested = {"solver": {"segment_mm": 0.5}}
@@ -84,15 +85,19 @@ def test_a_check_gives_sentences(study: Path, tmp_path: Path) -> None:
     assert wireval.check(tmp_path)[0].endswith("here or in frames/"), "a folder without scans"
 
 
-def test_a_check_warns_of_what_is_not_plausible(study: Path, tmp_path: Path) -> None:
-    """It was printed, and [] told a script that nothing is wrong."""
+def test_what_is_not_plausible_is_told_once(
+    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], recwarn: pytest.WarningsRecorder
+) -> None:
+    """A check warned of it and printed it; a run prints it."""
     text = (study / "manifest.toml").read_text(encoding="utf-8")
     for name in ("reference.mha", "frames", "truth.json"):
         (tmp_path / name).symlink_to(study / name)
     thick = re.sub(r"\nradius_mm = .*", "\nradius_mm = 1.5", text)
     (tmp_path / "manifest.toml").write_text(thick, encoding="utf-8")
-    with pytest.warns(UserWarning, match="radius_mm"):
-        assert wireval.check(tmp_path) == []
+    assert wireval.check(tmp_path) == []
+    told = [line for line in capsys.readouterr().out.splitlines() if "radius_mm" in line]
+    assert {line.partition(":")[0] for line in told} == {"warning"}
+    assert not recwarn.list
 
 
 OTHER_KINDS = [None, 3, 1.5, True, [3], {3: 4}, {"a": 3}, "", b"x", "a\0b", object(), (1, 2), float("nan"), "x" * 5000]
@@ -111,7 +116,7 @@ OTHER_KINDS = [None, 3, 1.5, True, [3], {3: 4}, {"a": 3}, "", b"x", "a\0b", obje
         ("wall_of", {"case": None}),
     ],
 )
-def test_an_argument_of_another_kind_is_refused_by_name(
+def test_an_argument_of_another_kind_is_no_bare_error(
     verb: str, given: dict[str, object], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """They were 'int' object has no attribute 'items', "expected str, bytes or os.PathLike object", an error that is
@@ -123,9 +128,76 @@ def test_an_argument_of_another_kind_is_refused_by_name(
                 getattr(wireval, verb)(**{**given, name: value})
 
 
+class BytesPath:
+    """A path that is no text."""
+
+    def __fspath__(self) -> bytes:
+        return b"x"
+
+
+NO_TEXT: tuple[object, ...] = None, 3, True, "", b"x", ["a"], BytesPath()
+NO_PLACE: tuple[object, ...] = *NO_TEXT, {"a": "b"}, "a\0b", "x" * 5000
+NO_LIST: tuple[object, ...] = 0, False, np.array(1), {1}.pop, b"x"
+NO_MAPPING: tuple[object, ...] = 0, 3, False, True, "", "a", [], ["a"], (), np.zeros(2), pd.DataFrame({"a": [1, 2]})
+NOT_ALLOWED: dict[str, tuple[object, ...]] = {
+    "scene": (*NO_TEXT, Path("bend")),
+    **dict.fromkeys(("manifest", "out", "first", "second"), NO_PLACE),
+    "tolerance": NO_PLACE[1:],
+    "settings": NO_MAPPING,
+    "jobs": (0, -1, 2.0, True, False, "2", [2], np.float64(2), np.array(2)),
+    "sweep": (*NO_MAPPING, {3: [4]}, *({"a": one} for one in (None, "1,2", {"b": 1}, *NO_LIST))),
+    "fail_if": (None, "", [""], ["a>1", 3], {"a": 1}, Path("a"), *NO_LIST),
+    "curves": (None, "", [""], ["a", 3], {"a": 3}, {"a": ""}, {3: "a"}, {"": "a"}, {"a": BytesPath()}, *NO_LIST),
+    "case": (None, "a", {}, Path("a")),
+}
+
+
+@pytest.mark.parametrize("name", ALLOWED)
+def test_what_an_argument_may_not_be_is_refused_by_its_name(name: str) -> None:
+    for value in NOT_ALLOWED[name]:
+        with pytest.raises(wireval.InputError) as error:
+            require(**{name: value})
+        assert str(error.value).startswith(f"{name}: ")
+
+
+def test_what_can_be_gone_through_once_is_a_list() -> None:
+    """Generators were refused where a list would do."""
+    assert require(fail_if=(text for text in ("a>1", "b>2")))["fail_if"] == ["a>1", "b>2"]
+    assert require(sweep={"k": map(int, "12"), "l": np.arange(2)})["sweep"] == {"k": [1, 2], "l": [0, 1]}
+    assert require(curves=map(Path, "ab"))["curves"] == ["a", "b"]
+    assert require(curves={"mine": Path("a")})["curves"] == ["mine=a"]
+    assert require(jobs=np.int64(2), sweep=None) == {"jobs": 2, "sweep": None}
+
+
+def test_an_entry_of_a_folder_is_its_path(study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The study lay in a folder of the name "<DirEntry 'o'>"."""
+    (tmp_path / "o").mkdir()
+    monkeypatch.chdir(tmp_path)
+    with os.scandir(".") as entries:
+        (entry,) = entries
+    written: list[Path] = []
+    monkeypatch.setattr(wireval, "carried_out", lambda args: written.append(args.out))
+    assert wireval.synth("straight", entry) == Path("o/manifest.toml")
+    assert written == [Path("o")]
+    assert require(curves={"mine": entry})["curves"] == ["mine=./o"]
+    for path in (BytesPath(), b"x"):
+        with pytest.raises(wireval.InputError, match=r"junit: got .*; expected a path"):
+            wireval.run(study, tmp_path / "out", junit=path)
+
+
+def test_what_a_run_exits_with_is_its_own(study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A registered solver's sys.exit was told as an option of the command line."""
+    monkeypatch.setattr(wireval, "carried_out", lambda args: sys.exit(7))
+    with pytest.raises(SystemExit, match="7"):
+        wireval.run(study, tmp_path / "out")
+    with pytest.raises(wireval.InputError, match=r"^help: of the command line alone; see help\(wireval\.run\)"):
+        wireval.run(study, tmp_path / "out", help=True)
+
+
 @pytest.mark.parametrize(
     ("given", "said"),
     [
+        ({"jobs": 2.0}, "jobs: got 2.0; expected a whole number from 1 on"),
         ({"sweep": 3}, 'sweep: got 3; expected a mapping to lists of values, {"simulate.wall_scale": [0.5, 2]}'),
         ({"fail_if": 3}, 'fail_if: got 3; expected a condition as text, "rms_mm>0.5", or a list of such'),
         ({"sweep": {"simulate.wall_scale": "0.5,2"}}, "sweep: got {'simulate.wall_scale': '0.5,2'}; expected"),
