@@ -321,8 +321,7 @@ def test_what_traces_are_known_to_is_of_the_insertions_that_are_named(sigma: flo
 
 
 @pytest.mark.parametrize(
-    ("stated", "apart", "told"),
-    [(0.0, 1e-3, True), (math.nan, 1e-3, True), (0.1, 0.2, True), (0.5, 1.4, False)],
+    ("stated", "apart", "told"), [(0.0, 1e-3, True), (math.nan, 1e-3, True), (0.1, 0.2, True), (0.5, 1.4, False)]
 )
 def test_what_is_stated_of_own_curves_tells_of_copies_within_bounds(stated: float, apart: float, told: bool) -> None:
     """With traces_mm = 0, or none, copies passed; with 0.5 mm insertions 1.4 mm apart were one scanned again.
