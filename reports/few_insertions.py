@@ -2,10 +2,11 @@
 
 import re
 from collections.abc import Mapping
-from math import isnan
+from math import floor, isnan
 from typing import Any
 
 from reports._content import value_of
+from reports.case_files import counted
 
 SHORT = 25
 """Frames of an insertion from which its interval holds the true value as often as it says (in 92 to 98 %)."""
@@ -30,7 +31,8 @@ def narrow_of_short(statistics: Mapping[str, Any]) -> str:
     good, of = (value_of(statistics.get(key)) for key in ("frames_ok", "insertions"))
     if isnan(value_of(statistics.get("rms_low_mm"))) or not good < SHORT * of:
         return ""
-    return f"Intervals over insertions of {good / of:.3g} frames, fewer than {SHORT}, may be too narrow."
+    frames = counted(max(1, floor(good / of)), "frame")
+    return f"Insertions of {frames} seldom hold one that is far off: below {SHORT}, intervals may be too narrow."
 
 
 def alone_in(statistics: Mapping[str, Any], skill: float, least: float, most: float) -> str:

@@ -61,7 +61,8 @@ def section(page: str, entry: Mapping[str, Any], data: Any, folder: Path, embed:
     path = folder / "figures" / f"{entry['figure']}.png"
     drawing = figures_of(page)[entry["figure"]](data)
     if drawing is None:
-        remove_files(path, path.with_suffix(".csv"))
+        # a folder of that name is no picture
+        remove_files(*(file for file in (path, path.with_suffix(".csv")) if not file.is_dir()))
         return {}
     save(drawing, path)
     width, height = (round(DOTS_PER_INCH * inch) for inch in drawing.figure.get_size_inches())

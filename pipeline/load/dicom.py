@@ -19,7 +19,7 @@ from pipeline.load.files import held_in
 from pipeline.load.geometry import Box, Header, LoadError, Source, unusable
 from pipeline.load.guard import is_folder, require_room
 from pipeline.load.order import in_order
-from pipeline.load.slices import Plane, dataset, grey, is_dicom, is_image, planes_of
+from pipeline.load.slices import Plane, dataset, grey, is_dicom, is_image, off_unit, planes_of
 from pipeline.load.voxels import read_box, scaled
 
 GAP_TOLERANCE, OFF_GRID = 0.01, 0.05
@@ -221,6 +221,9 @@ def read_header(source: Source, config: LoadConfig) -> Header:
         count = int(np.floor(np.ptp(stack.heights) / gap + 1e-6)) + 1
     notes = [f"resampled onto a regular grid: {p}" for p in problems]
     notes += [f"{source.path.name}: MONOCHROME1: grey values turned round, so that white is high"] * pixels.inverted
+    if any(off_unit(plane.orientation) for plane in stack.planes):
+        why = "has vectors that are off the length 1, as their decimals explain"
+        notes.append(f"{source.path.name}: ImageOrientationPatient {why}: divided by their lengths")
     return Header(
         source, (pixels.columns, pixels.rows, count), np.array([*stack.pixel_mm, gap]), stack.planes[0].position,
         np.column_stack([stack.axes, stack.normal]), str(np.dtype(pixels.kind).newbyteorder("=")),

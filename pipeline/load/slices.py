@@ -7,6 +7,7 @@ are read. A file of several frames without them is a run of projections or a fil
 import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
+from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
@@ -129,13 +130,30 @@ def planes_of(path: Path, data: Any) -> list[Plane]:
 
 def _plane(path: Path, frame: int, groups: list[Any], pixels: Pixels, *, several: bool) -> Plane:
     position, orientation, spacing = (_numbers(path, groups, name, count) for name, count in PLACE)
-    lengths = np.linalg.norm(orientation.reshape(2, 3), axis=1)
-    if np.abs(lengths - 1.0).max() > UNIT:
-        why = f"ImageOrientationPatient {orientation.tolist()} has vectors of the lengths {lengths.round(3).tolist()}"
-        raise unusable(path, f"{why}; allowed: unit vectors (to {UNIT:g}). Export the series again.")
+    if off_unit(orientation) and not _rounded(orientation, _first("ImageOrientationPatient", groups)):
+        lengths = np.linalg.norm(orientation.reshape(2, 3), axis=1).round(3).tolist()
+        why = f"ImageOrientationPatient {orientation.tolist()} has vectors of the lengths {lengths}"
+        allowed = f"unit vectors (to {UNIT:g}, or as rounding to the decimals that are written explains)"
+        raise unusable(path, f"{why}; allowed: {allowed}. Export the series again, or divide by the lengths.")
     slope, intercept = (_numbers(path, groups, name, 1, default) for name, default in RESCALE)
     rescale = float(slope[0]), float(intercept[0])
     return Plane(path, frame, position, orientation, spacing[::-1], pixels, *rescale, several)
+
+
+def off_unit(orientation: NDArray[np.float64]) -> bool:
+    """Whether the vectors (6,) of an orientation are off the length 1 by more than UNIT."""
+    return bool(np.abs(np.linalg.norm(orientation.reshape(2, 3), axis=1) - 1.0).max() > UNIT)
+
+
+def _rounded(orientation: NDArray[np.float64], written: Any) -> bool:
+    """Whether there are unit vectors that are ``written`` so with these decimals: 0.7, 0.7, 0 has the length 0.99.
+
+    Whole numbers are no directions: 1, 1, 0 would be known to 30 degrees.
+    """
+    places = min(int(Decimal(str(number)).as_tuple().exponent) for number in written)
+    size, half = np.abs(orientation.reshape(2, 3)), 0.5 * 10.0**places
+    least, most = (np.linalg.norm(np.maximum(size + off, 0.0), axis=1) for off in (-half, half))
+    return places < 0 and bool(np.all((least <= 1.0) & (most >= 1.0)))
 
 
 RESCALE = (("RescaleSlope", 1.0), ("RescaleIntercept", 0.0))

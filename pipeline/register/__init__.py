@@ -100,7 +100,7 @@ class Registration:
                 "its place and set trace.register = off"
             )
         if not self.applied:
-            return f"no registration applied: the phantom moved by {self.moved_voxels:.2f} voxel{self.doubt}"
+            return f"no registration applied: the phantom moved by {self.moved_voxels:.2f} voxel"
         shift = ", ".join(f"{s:.3f}" for s in self.centre_shift_mm)
         return (
             f"registered: phantom moved by ({shift}) mm and {self.motion.angle_deg:.2f} degrees, "
@@ -128,9 +128,9 @@ def _with_rest(found: Registration, frame: Volume, to: Anchor, last: Solved | No
     return replace(found, bent=off, wider=more, branch=branch)
 
 
-def _still(frame: Volume, to: Anchor, fit: Fit, moved: float, loose_mm: float = 0.0) -> Registration:
+def _still(frame: Volume, to: Anchor, fit: Fit, moved: float) -> Registration:
     """A motion that is too small to be applied."""
-    found = Registration(moved_voxels=moved, left_voxels=moved, misfit_voxels=fit.misfit_voxels, loose_mm=loose_mm)
+    found = Registration(moved_voxels=moved, left_voxels=moved, misfit_voxels=fit.misfit_voxels)
     return _with_rest(found, frame, to, fit.last, taken=True)
 
 
@@ -158,13 +158,13 @@ def register(frame: Volume, to: Anchor, skip_voxels: float) -> Registration:
     if last.misfit_voxels > BAD_MISFIT_VOXELS:
         noise = wall.noise_voxels(static_points(frame, wall.points_mm, to.patch_mm).noise)
         return Registration(moved_voxels=moved, left_voxels=left, misfit_voxels=last.misfit_voxels, noise_voxels=noise)
-    far, loose_mm = farthest(motion, wall), loose * wall.voxel_mm
+    far = farthest(motion, wall)
     # only grey that is shaded otherwise looks like a motion: slopes explain those of a straight tube, too
     if far < skip_voxels or shading != "one":
         still, _ = look(frame, wall, Motion())
         near = farthest(still.motion, wall)
         if far < skip_voxels or (near < skip_voxels and still.misfit_voxels < AS_WELL * last.misfit_voxels):
-            return _still(frame, to, still, min(far, near), loose_mm)
-    shift = motion.displacement_mm(wall.centre_mm)
+            return _still(frame, to, still, min(far, near))
+    shift, loose_mm = motion.displacement_mm(wall.centre_mm), loose * wall.voxel_mm
     found = Registration(motion, True, far, left, last.misfit_voxels, shift, loose_mm)
     return _with_rest(found, frame, to, last.last, taken=False)

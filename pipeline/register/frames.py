@@ -79,7 +79,7 @@ def sentences_of(
     if alignment.anchor is None:
         return [alignment.reason], []
     known = [(n, r) for n, r in found.items() if r is not None]
-    still = [(r.moved_voxels, n) for n, r in known if not r.applied and r.trusted and not r.doubt]
+    still = [(r.moved_voxels, n) for n, r in known if not r.applied and r.trusted]
     texts = [f"frame {n}: {r.sentence}" for n, r in known if r.applied and not r.doubt]
     if still:
         most, where = max(still)
@@ -92,7 +92,7 @@ def sentences_of(
         texts.append(HIDES)
     doubtful: dict[str, list[int]] = {}
     for n, r in known:
-        if not r.trusted or r.doubt:
+        if not r.trusted or (r.applied and r.doubt):
             doubtful.setdefault(r.sentence, []).append(n)
     told = [f"{frames_in_words(numbers)}: {text}" for text, numbers in doubtful.items()]
     return texts, told + (_of_rests([(n, r.rests) for n, r in known]) if wall_right else [])

@@ -27,6 +27,8 @@ from reports.doubts import COUNT_AS
 WRITTEN = "are one scan, written again"
 OR_ELSE = ", or each a group of its own name where the wire was drawn out and pushed in again between the scans"
 RESCANNED = "tell no more than one insertion that was scanned again"
+MOST_OWN_MM = 0.2
+"""Most that own traces, the least being OWN_MM, are taken to be known to: half a voxel of 0.4 mm."""
 NEAREST_MM = 2.0
 """How far off the nearest depth may be, at the least; else half as far as one of its frames is from the next: a trace
 that is farther off stands in for one that is missing, and what is lost would make the wire look better."""
@@ -84,14 +86,15 @@ def copies(found: Sequence[Found]) -> list[str]:
 
 
 def _known_to(case: Found, rows: Sequence[Scored]) -> float:
-    """What the traces of these frames are known to, mm, median; those that were given as ``repeated`` supposes.
+    """What the traces of these frames are known to, mm, median; of those that were given, what is stated, in bounds.
 
-    What is stated of them (traces_mm) may be 0, of which copies were not told, or 0.5 mm, of which two insertions were
-    told that lie 1.4 mm apart.
+    traces_mm may be 0 or left out, of which copies were not told, or 0.5 mm, of which two insertions were told that lie
+    1.4 mm apart.
     """
+    known = float(np.median([frame.row.get("trace_sigma_mm") or math.nan for frame in rows] or [math.nan]))
     if any((frame.get("trace") or {}).get("given") for frame in case.result.frames):
-        return OWN_MM
-    return float(np.median([frame.row.get("trace_sigma_mm") or math.nan for frame in rows] or [math.nan]))
+        return float(np.clip(np.nan_to_num(known, nan=OWN_MM), OWN_MM, MOST_OWN_MM))
+    return known
 
 
 def _stated_apart(both: tuple[str, ...], found: Sequence[Found]) -> bool:

@@ -68,6 +68,8 @@ class Worker(Generic[J, R]):
     """A worker process and the job that it is doing."""
 
     def __init__(self, work: Callable[[J], R]) -> None:
+        # one that was killed meanwhile multiprocessing would start again, with as many threads as there are cores
+        _start_server()
         context = multiprocessing.get_context("forkserver")
         self.pipe, theirs = context.Pipe()
         self.process = context.Process(target=_serve, args=(theirs, work))
@@ -116,16 +118,16 @@ def in_processes(
 
     The workers are ended however the generator is left.
     """
-    _start_server()
     waiting, idle, busy = deque(jobs), list[Worker[J, R]](), list[Worker[J, R]]()
     try:
         while waiting or busy:
             while waiting and len(busy) < count:
                 try:
                     busy.append(idle.pop() if idle else Worker(work))
-                except (EOFError, ConnectionError):  # the server was killed: another one is started for the next job
-                    yield Outcome(waiting.popleft(), None, LOST, f"{LOST} (its server was)", "worker_lost")
-                    _start_server()
+                except (EOFError, ConnectionError):
+                    why = f"{LOST} (the server that starts workers was killed)"
+                    yield Outcome(waiting.popleft(), None, LOST, why, "worker_lost")
+                    time.sleep(LOOK_S)  # until it has ended: only then another one is started
                     continue
                 busy[-1].give(waiting.popleft())
             ready = connection.wait([worker.pipe for worker in busy], LOOK_S if limits.any or not busy else None)
@@ -152,7 +154,10 @@ def resident_mib(process: int | None) -> float:
 
 
 def _start_server() -> None:
-    """Start the server that workers are forked from, with one thread each: N times N threads slow each other down."""
+    """Start the server that workers are forked from, unless it runs, with one thread each.
+
+    N times N threads slow each other down.
+    """
     before = {name: os.environ.get(name) for name in (*THREADS, *PATHS)}
     one_thread()
     # Python would look in the working folder first, where a user's own pipeline.py may lie

@@ -16,15 +16,16 @@ import pandas as pd
 import pytest
 
 from pipeline.benchmark.stress import run as study
+from pipeline.benchmark.stress import scene_run
 from pipeline.benchmark.stress.axes import AXES, draw
 from pipeline.benchmark.stress.lumens import NEAR, changes_vessel, near_vessels
-from pipeline.benchmark.stress.plan import ScenePlan, placement
+from pipeline.benchmark.stress.plan import ScenePlan, lumen_grid, placement
 from pipeline.benchmark.stress.rubbing import RUBBING_MM, made_energy
 from pipeline.benchmark.stress.run import run_isolated, run_stress, stress_table
 from pipeline.benchmark.stress.scene_run import SceneOutcome, build, run_plan, run_scene, solve
 from pipeline.benchmark.stress.statics import StaticChain, assemble
 from pipeline.benchmark.stress.verdict import _strays, judge
-from solver import Solution, relax
+from solver import Grid, Solution, relax
 from tests.later import later
 
 SEED = 400
@@ -48,6 +49,19 @@ def test_all_scenes_end_as_they_may(tmp_path: Path) -> None:
     rows = run_stress(tmp_path / "scenes.csv", SEED, range(5000), print, min(2, os.cpu_count() or 1))
     faults = rows[rows["fault"] != ""]
     assert faults.empty, faults[["index", "axes", "fault", "detail"]].to_string()
+
+
+def test_a_wall_in_another_unit_is_warned_of_and_a_noisy_one_is_not(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Lumens of two voxels in noise were to warn of nothing, and with them no wall warned any more."""
+    build(replace(ScenePlan(SEED, 0), noise_mm=0.8))
+    monkeypatch.setattr(scene_run, "lumen_grid", lambda plan: in_quarters(lumen_grid(plan)))
+    with pytest.warns(UserWarning, match=r"it changes by 3\.9 per mm"):
+        build(ScenePlan(SEED, 0))
+
+
+def in_quarters(grid: Grid) -> Grid:
+    """In voxels of a quarter of a millimetre."""
+    return grid.with_values(4.0 * np.asarray(grid.values))
 
 
 # called converged with a moment left (closed form, and Newton on a wall of 7e5 N/mm²), or without an end

@@ -13,7 +13,6 @@ from pipeline.run.log import Log
 from pipeline.run.stages.depths import (
     drawn_back,
     in_step,
-    on_another_scale,
     perhaps_turned,
     shrinking,
     standing,
@@ -27,6 +26,7 @@ from pipeline.run.stages.gaps import own_gaps
 from pipeline.run.stages.known import Frame
 from pipeline.run.stages.misstated import as_steps, in_another_order
 from pipeline.run.stages.repeated import kept, once
+from pipeline.run.stages.scales import on_another_scale
 from pipeline.run.stages.trace import _in_step, _last_curve, _Part
 from pipeline.run.stages.way import with_depths
 from pipeline.simulate.clamp import Clamp
@@ -177,17 +177,32 @@ def test_a_wrong_voxel_size_of_a_few_depths_is_no_wrong_zero(scale: float) -> No
 
 @pytest.mark.parametrize("count", [6, 10])
 def test_slack_that_grows_as_the_square_of_the_depth_is_no_voxel_size(count: int) -> None:
-    """Of slack up to 2 mm the scans' voxel size was asked for: a straight line explained most of it, and no scale."""
-    rng, stated = np.random.default_rng(2), np.linspace(10.0, 40.0, count)
+    """Of slack up to 2 mm the scans' voxel size was asked for: a straight line explained most of it, and no scale.
+
+    Of six such depths it is told in 95 % of draws, of ten in all.
+    """
+    rng, stated = np.random.default_rng(4), np.linspace(10.0, 40.0, count)
     off = rng.normal(scale=0.02, size=count)
     seen = frames([*(stated - 2.0 * (stated / 40.0) ** 2 + off)], [*stated])
     (said,) = on_another_scale(seen, from_entry(seen))
-    assert "no voxel size and no scale" in said
+    assert "no one scale explains that" in said
     assert float(said.partition("grow ")[2].partition(" times")[0]) == pytest.approx(0.975, abs=0.005)
     assert Caveats(warnings=[said]).against
     seen = frames([*(0.97 * stated - 2e-4 * stated**2 + off)], [*stated])
     (said,) = on_another_scale(seen, from_entry(seen))
     assert "is the scans' voxel size right" in said, "a little bend beside a wrong scale"
+
+
+def test_a_depth_that_is_misread_at_an_end_bends_no_scale() -> None:
+    """Of 30 depths one end was off by 1 mm, and the voxel size that was wrong "no voxel size does" in 9 of 200."""
+    rng, stated, told = np.random.default_rng(7), np.linspace(5.0, 60.0, 30), 0
+    for _ in range(200):
+        read = 1.05 * stated + rng.normal(scale=0.1, size=30)
+        read[rng.choice([0, -1])] += rng.choice([-1.0, 1.0])
+        seen = frames([*read], [*stated])
+        (said,) = on_another_scale(seen, from_entry(seen))
+        told += "no one scale" in said
+    assert told <= 5
 
 
 def test_right_depths_are_hardly_ever_told_to_be_on_another_scale() -> None:

@@ -321,6 +321,26 @@ def test_a_damaged_slice_is_named_wherever_it_lies(tmp_path: Path, content: byte
         read_header(tmp_path / "series")
 
 
+def test_an_orientation_that_is_written_with_one_decimal_is_taken_as_such(tmp_path: Path) -> None:
+    """45 degrees as 0.7, 0.7 were refused for a length of 0.99, and exported again they still are."""
+    write_series(tmp_path / "series", numbered(), straight_stack())
+
+    def written(*orientation: str) -> Path:
+        for path in (tmp_path / "series").iterdir():
+            plane = pydicom.dcmread(path)
+            plane.ImageOrientationPatient = list(orientation)
+            plane.save_as(path)
+        return tmp_path / "series"
+
+    header = read_header(written("0.7", "0.7", "0", "-0.7", "0.7", "0"))
+    half = np.sqrt(0.5)
+    np.testing.assert_allclose(header.direction, [[half, -half, 0], [half, half, 0], [0, 0, 1]], rtol=0.0, atol=1e-12)
+    assert header.assumed[0].startswith("series: ImageOrientationPatient has vectors that are off the length 1")
+    for wrong in (("0.70", "0.70", "0", "-0.70", "0.70", "0"), ("1", "1", "0", "-1", "1", "0")):
+        with pytest.raises(LoadError, match="or divide by the lengths"):
+            read_header(written(*wrong))
+
+
 def test_contours_beside_the_slices_are_no_damaged_slice(tmp_path: Path) -> None:
     """The archive of a planning system holds an RTSTRUCT in the folder of its slices; GDCM lists it in no series."""
     write_series(tmp_path / "series", numbered(), straight_stack())

@@ -320,14 +320,19 @@ def test_what_traces_are_known_to_is_of_the_insertions_that_are_named(sigma: flo
     assert "known to 0.05 mm" in said
 
 
-@pytest.mark.parametrize(("stated", "apart", "told"), [(0.0, 1e-3, True), (math.nan, 1e-3, True), (0.5, 1.4, False)])
-def test_what_is_stated_of_own_curves_tells_of_no_copies(stated: float, apart: float, told: bool) -> None:
-    """With traces_mm = 0, or none, copies passed; with 0.5 mm insertions 1.4 mm apart were one scanned again."""
+@pytest.mark.parametrize(
+    ("stated", "apart", "told"), [(0.0, 1e-3, True), (math.nan, 1e-3, True), (0.1, 0.2, True), (0.5, 1.4, False)]
+)
+def test_what_is_stated_of_own_curves_tells_of_copies_within_bounds(stated: float, apart: float, told: bool) -> None:
+    """With traces_mm = 0, or none, copies passed; with 0.5 mm insertions 1.4 mm apart were one scanned again.
+
+    Where nothing stated counted, one that was scanned again passed, its traces stated at 0.1 mm and 0.2 mm apart.
+    """
     trace = {"frame": 0, "status": "ok", "sentence": "", "message": "", "trace": {"given": True}}
     cases = []
     for name, other in ("ab", "ba"):
         frame = Scored({"trace_sigma_mm": stated}, np.zeros(1), np.zeros(1), name, {other: (10 * apart**2, 10)})
-        cases.append(Found(replace(untold(name), frames=[trace]), {0: frame}, insertion=name))
+        cases.append(Found(replace(untold(name), group=name, frames=[trace]), {0: frame}, insertion=name))
     assert bool(copies(cases)) is told
 
 

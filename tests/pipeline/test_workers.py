@@ -78,6 +78,25 @@ def test_a_server_that_is_killed_as_it_starts_costs_no_job(monkeypatch: pytest.M
     (lost,) = run_all([7], abs, limits=Limits(seconds=20.0))
     assert lost.lost
     assert "killed twice" in lost.error
+    assert lost.log.endswith("(the server that starts workers was killed)")
+
+
+def threads_of_a_worker(job: str) -> str | None:
+    """The limit of its threads, or the worker's end."""
+    if job == "ends":
+        os.kill(os.getpid(), signal.SIGKILL)
+    return os.environ.get("OMP_NUM_THREADS")
+
+
+def test_a_server_that_is_killed_while_it_waits_is_started_as_the_first_was(monkeypatch: pytest.MonkeyPatch) -> None:
+    """multiprocessing started it again with this process's environment: as many threads as cores in each worker."""
+    monkeypatch.delenv("OMP_NUM_THREADS", raising=False)
+    outcomes = in_processes(["ends", "asks"], threads_of_a_worker, 1)
+    assert next(outcomes).lost
+    server = multiprocessing.forkserver._forkserver._forkserver_pid
+    os.kill(server, signal.SIGKILL)
+    wait_for(lambda: not running(server))
+    assert next(outcomes).result == "1"
 
 
 def test_time_in_which_everything_was_suspended_does_not_count(monkeypatch: pytest.MonkeyPatch) -> None:

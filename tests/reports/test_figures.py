@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -722,9 +723,12 @@ def test_the_caption_speaks_of_a_cross_where_there_is_one(frame: int | None, tmp
     out = write_run(tmp_path / "out", [FakeCase("c", frames=3)])
     path = out / "cases" / "c" / "errors.csv"
     errors = tables.read(path, ERRORS)
-    tables.write(path, ERRORS, errors.assign(branch_ok=[n != frame for n in range(3)]))
+    known = 0.1 if frame is None else math.nan
+    tables.write(path, ERRORS, errors.assign(branch_ok=[n != frame for n in range(3)], tip_sigma_mm=known))
     drawing = draw(CASE_FIGURES["tip_by_depth"], read_case(path.parent))
     (entry,) = [entry for entry in declared("case") if entry["figure"] == "tip_by_depth"]
+    line = "The thin line is how well the traced tip is known"
+    assert (line in caption(entry["read"], drawing.table)) == (frame is None), "the line was drawn, and not explained"
     said = caption(entry["bad"], drawing.table)
     assert ("filled cross" in said) == (frame is not None)
     assert "by tens of degrees" in said, "any angle but a constant one swings"

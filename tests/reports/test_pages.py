@@ -337,7 +337,9 @@ def test_a_picture_whose_data_is_gone_is_removed(tmp_path: Path) -> None:
     figures.mkdir()
     for name in ("error_along_wire.png", "error_along_wire.csv"):
         (figures / name).write_text("left from an earlier run", encoding="utf-8")
+    (figures / "tip_by_depth.png").mkdir()
     render_case(out / "cases" / "c")
+    assert (figures / "tip_by_depth.png").is_dir(), "it ended the run with all of its cases"
     assert not list(figures.glob("error_along_wire*"))
     assert (figures / "contact_along_wire.png").exists()
 

@@ -89,18 +89,15 @@ def coverage(c: Condition, repetitions: int) -> np.ndarray:
     return np.mean([covered(draw, c) for _ in range(repetitions)], axis=0)
 
 
-def coverage_of_short(frames: int, repetitions: int) -> np.ndarray:
+def coverage_of_short(frames: int, repetitions: int, *, outliers: bool = True) -> np.ndarray:
     """The same (3,) with so few frames in each insertion, the least over 3, 6 and 20 insertions.
 
-    With outliers, and insertions that do not differ otherwise: short ones often hold no outlier, and nothing tells then
-    how far off one is.
+    Insertions do not differ otherwise. Short ones often hold no outlier, and nothing tells then how far off one is.
     """
     shares = []
     for insertions in (3, 6, 20):
-        draw, c = (
-            np.random.default_rng([SEED, insertions, frames, 2]),
-            Condition(0.5, insertions, 0.0, False, True, frames),
-        )
+        c = Condition(0.5, insertions, 0.0, False, outliers, frames)
+        draw = np.random.default_rng([SEED, insertions, frames, 2])
         shares.append(np.mean([covered(draw, c) for _ in range(repetitions)], axis=0))
     return np.min(shares, axis=0)
 
@@ -172,11 +169,10 @@ def main(repetitions: int = 4000) -> None:
             *np.column_stack([low, high]).ravel()
         )
     )
-    for frames in SHORT:
-        shares = coverage_of_short(frames, repetitions)
-        print(
-            "{} frames each: {:.3f} (mean square), {:.3f} (skill), {:.3f} (median)".format(frames, *shares), flush=True
-        )
+    for frames, outliers in itertools.product(SHORT, (True, False)):
+        shares = coverage_of_short(frames, repetitions, outliers=outliers)
+        of = f"{frames} frames each, with{'out' * (not outliers)} outliers"
+        print(f"{of}: " + "{:.3f} (mean square), {:.3f} (skill), {:.3f} (median)".format(*shares), flush=True)
     for insertions in PARTNERS:
         share = coverage_by_partners(insertions, repetitions)
         print(f"skill against the other insertions, {insertions} of them: {share:.3f}", flush=True)

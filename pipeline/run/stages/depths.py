@@ -36,15 +36,8 @@ APART = 2.0
 """Standard deviations of two tips from which their distance is not the stated one: by chance one step in 44."""
 SURELY = 6.0
 """Standard deviations from which a single such step is told: two frames of thirty that are exchanged are 9 apart."""
-LEAST_SCALE, CHANCE = 0.01, 1e-3
-"""By how much a scale must be off to be told, and how often right depths may seem as wrong."""
-CLEARLY = 2.5
-"""By how many times less a wrong scale must leave than a wrong zero to be told for it, where a line is not sure of its
-slope: of right depths it is told of 1 to 2 in 1000, of those with a wrong zero, read to 0.5 mm, of 1 to 11."""
-BENT, BY_CHANCE = 0.5, 0.01
-"""Share of the mean scale by which scales at the first and the last depth must differ to be no one scale (of what grows
-as the square of the depth by 1 to 2, of a wrong voxel size by nothing), and how often that may be chance: of wrong
-voxel sizes 9 of 1700 were told so."""
+CHANCE = 1e-3
+"""How often right depths may seem wrong."""
 NEAR_ONE = 0.2
 """How near to -1 a slope of traced lengths over stated depths is that of lengths left outside."""
 OUTSIDE = "are these the lengths left outside (insertion_mm is beyond entry_mm), or are frames in opposite order?"
@@ -91,7 +84,7 @@ def traced_depths(frames: Sequence[Frame], entry_mm: ArrayLike, direction: Array
     return {f.index: depth_from(clamp, f.curve) for f in seen if f.curve is not None and np.isfinite(f.expected_mm)}
 
 
-def _by_stated_depth(frames: Sequence[Frame], depths_mm: Mapping[int, float]) -> tuple[Array, Array]:
+def by_stated_depth(frames: Sequence[Frame], depths_mm: Mapping[int, float]) -> tuple[Array, Array]:
     """Each stated depth (n,), and the median (n,) of the traced ones there: scans of one depth share one reading.
 
     depths_mm : of ``traced_depths``.
@@ -127,7 +120,7 @@ def stated_elsewhere(
     traced tips.     read_mm : of each stated depth by itself; None where the manifest does not state it.
     """
     seen = [f for f in frames if f.index in depths_mm]
-    stated, traced = _by_stated_depth(seen, depths_mm)
+    stated, traced = by_stated_depth(seen, depths_mm)
     known = traced - stated
     if len(known) < FEWEST_ALIKE:
         return []
@@ -159,64 +152,10 @@ def _median_within(apart: Array, tips_mm: Array, read_mm: float | None) -> float
     return OF_MEDIAN * off / float(np.sqrt(len(apart)))
 
 
-def on_another_scale(frames: Sequence[Frame], depths_mm: Mapping[int, float]) -> list[str]:
-    """A warning where traced depths grow faster, or slower, than insertion_mm. depths_mm : of ``traced_depths``.
-
-    By least squares over the stated depths; a scale that is read by hand to 0.5 mm leaves a few per cent open. With
-    the zero right it leaves less open, and is told where a wrong zero explains clearly less.
-    """
-    stated, traced = _by_stated_depth(frames, depths_mm)
-    if len(stated) < FEWEST:
-        return []
-    (slope, _), covariance = np.polyfit(stated, traced - stated, 1, cov=True)
-    deviation, zero = float(np.sqrt(covariance[0, 0])), ""
-    if not _scale_told(slope, deviation, len(stated) - 2):
-        slope, left = _scale_from_zero(stated, traced - stated)
-        deviation, if_zero = left / float(np.linalg.norm(stated)), float(np.std(traced - stated, ddof=1))
-        # four depths cannot tell: of those from a wrong zero, read to 0.5 mm, it was told in 21 of 1000
-        if len(stated) <= FEWEST or left * CLEARLY > if_zero or not _scale_told(slope, deviation, len(stated) - 1):
-            return []
-        zero = f"; {left:.2f} mm rms are left, {if_zero:.2f} if all were counted from elsewhere"
-    if _runs_down(stated, traced):
-        return [f"the traced wires get longer where insertion_mm states less: {OUTSIDE}"]
-    if bent := _on_no_one_scale(stated, traced - stated):
-        return [bent]
-    return [
-        f"the traced wires grow {1.0 + slope:.3f} times as fast as insertion_mm states (standard deviation "
-        f"{deviation:.2g}, {len(stated)} stated depths{zero}): is the scans' voxel size right, or the scale that "
-        "depths were read from? With a wrong size all lengths and errors are as wrong"
-    ]
-
-
-def _runs_down(stated: Array, traced: Array) -> bool:
+def runs_down(stated: Array, traced: Array) -> bool:
     """Whether traced lengths (n,) fall by as much as stated depths (n,) grow: no scale does that."""
     known = len(stated) >= FEWEST_ALIKE and np.ptp(stated) > 0.0
     return bool(known and abs(np.polyfit(stated, traced, 1)[0] + 1.0) < NEAR_ONE)
-
-
-def _on_no_one_scale(stated: Array, apart: Array) -> str:
-    """A sentence where what stated depths (n,) are off by (n,) bends too clearly for a wrong scale; else empty."""
-    (bend, slope, _), covariance = np.polyfit(stated, apart, 2, cov=True)
-    first, last = slope + 2.0 * bend * stated[[0, -1]]
-    limit = float(stdtrit(len(stated) - 3, 1.0 - 0.5 * BY_CHANCE) * np.sqrt(covariance[0, 0]))
-    if abs(bend) <= limit or abs(last - first) <= 0.5 * BENT * abs(last + first):
-        return ""
-    return (
-        f"the traced wires grow {1.0 + first:.3f} times as fast as insertion_mm states at {stated[0]:g} mm and "
-        f"{1.0 + last:.3f} times at {stated[-1]:g} mm ({len(stated)} stated depths): no voxel size and no scale of "
-        "depths does that; does the wire slip or lie slack before the entry as it is pushed, or do traces cut corners?"
-    )
-
-
-def _scale_told(slope: float, deviation: float, freedom: int) -> bool:
-    """Whether a scale is off by more than chance explains, and by enough to be told."""
-    return abs(slope) >= max(LEAST_SCALE, float(stdtrit(freedom, 1.0 - 0.5 * CHANCE)) * deviation)
-
-
-def _scale_from_zero(stated: Array, apart: Array) -> tuple[float, float]:
-    """By how much of the stated depths (n,) what they are off by (n,) grows from 0, and the rms that this leaves."""
-    slope = float(stated @ apart / (stated @ stated))
-    return slope, float(np.linalg.norm(apart - slope * stated)) / float(np.sqrt(len(stated) - 1))
 
 
 def perhaps_turned(frames: Sequence[Frame]) -> list[Frame]:
@@ -224,7 +163,7 @@ def perhaps_turned(frames: Sequence[Frame]) -> list[Frame]:
     out = list(frames)
     wrong = FrameStatus.LENGTH_MISMATCH.identifier
     known = [(f.expected_mm, f.curve.length_mm) for f in frames if f.curve is not None and np.isfinite(f.expected_mm)]
-    why = OUTSIDE if _runs_down(*np.array(known).reshape(-1, 2).T) else TURNED
+    why = OUTSIDE if runs_down(*np.array(known).reshape(-1, 2).T) else TURNED
     for n, f in enumerate(frames):
         if f.status == wrong and f.curve is not None and hardly_begun(f.curve.length_mm, f.expected_mm):
             out[n] = replace(f, message=f"{f.message}; {why}")

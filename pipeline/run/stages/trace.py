@@ -23,7 +23,6 @@ from pipeline.run.stages.brightness import of_another_brightness
 from pipeline.run.stages.depths import (
     drawn_back,
     in_step,
-    on_another_scale,
     perhaps_turned,
     shrinking,
     standing,
@@ -39,6 +38,7 @@ from pipeline.run.stages.known import Context, Frame, Known, trusted
 from pipeline.run.stages.misstated import as_steps, in_another_order
 from pipeline.run.stages.own_curves import RESAMPLE, as_given, given_curves, rough
 from pipeline.run.stages.repeated import alike, once, rescanned
+from pipeline.run.stages.scales import on_another_scale
 from pipeline.run.stages.thickness import not_too_thick, too_thin
 from pipeline.run.stages.wire_free import wire_in_reference
 from pipeline.run.straightened import straightened
