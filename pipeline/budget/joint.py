@@ -41,7 +41,7 @@ def coefficients(
     axes = axes_across(curve, foot)[end]
     drawn = np.einsum("nai,mni->mna", axes, wires[:, end] - nominal[end])
     last = TraceSamples(trace.index, trace.arc_mm[end], trace.points_mm[end], trace.sigma_mm[end], trace.knot_mm)
-    noise = covariance_of_traces([last], voxel_mm)
+    noise = covariance_of_traces([last], voxel_mm, drawn=True)
     root = np.linalg.cholesky(noise + NOTHING_MM2 * np.eye(len(noise)))
     drawn += np.einsum("nk,mka->mna", root, rng.standard_normal(drawn.shape))
     real = np.einsum("nai,ni->na", axes, (at_arc(curve, foot) - nominal)[end])
