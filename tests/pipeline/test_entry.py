@@ -20,7 +20,14 @@ from pipeline.run.stages.known import Frame
 from pipeline.simulate import together
 from pipeline.simulate.clamp import Prior, TracedFrame, depth_from, estimated_clamp, moved
 from pipeline.simulate.clamp_told import IF_AS_MODELLED, left_out
-from pipeline.simulate.evidence import TraceSamples, covariance_of, covariance_of_traces, posterior, roughness_mm, sigma_across
+from pipeline.simulate.evidence import (
+    TraceSamples,
+    covariance_of,
+    covariance_of_traces,
+    posterior,
+    roughness_mm,
+    sigma_across,
+)
 from pipeline.simulate.way import Stop, Way
 from pipeline.status import FrameStatus, StageError
 from solver import GuideWire, Insertion, Solution
