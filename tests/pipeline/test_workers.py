@@ -73,7 +73,7 @@ def test_a_server_that_is_killed_as_it_starts_costs_no_job(monkeypatch: pytest.M
 
     monkeypatch.setattr(workers, "_start_server", start)
     most = 1
-    assert [(o.job, o.result) for o in run_all([7, 8], abs, 2)] == [(8, 8), (7, 7)]
+    assert sorted((o.job, o.result) for o in run_all([7, 8], abs, 2)) == [(7, 7), (8, 8)]
     most, killed = 99, []
     (lost,) = run_all([7], abs, limits=Limits(seconds=20.0))
     assert lost.lost
