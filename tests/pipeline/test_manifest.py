@@ -259,9 +259,13 @@ def test_an_entry_in_metres_is_asked_about(tmp_path: Path) -> None:
     """Of an entry 8 mm from the origin, written in metres, check found nothing."""
     text = GOOD.replace("[1.0, 2.0, 3.0]", "[0.000012, -0.000137, -0.00794]")
     (case,) = read_manifest(written(tmp_path, text)).cases
-    (told,) = entry_in_metres(case)
+    (told,) = entry_in_metres(case, None)
     assert told == "entry_mm lies within 0.05 mm of 0, 0, 0: is it in metres ([0.012, -0.137, -7.94] mm)?"
-    assert entry_in_metres(case.model_copy(update={"entry_mm": (0.0, 0.0, 0.0)})) == []
+    for at in ((0.0, 0.0, 0.0), (1.2e-16, 0.0, 0.0)):
+        assert entry_in_metres(case.model_copy(update={"entry_mm": at}), None) == [], "the origin, as it was rounded"
+    for origin_mm, count in ((-10.0, 1), (0.0, 0)):
+        header = Header(Source(tmp_path), (96,) * 3, np.full(3, 0.5), np.full(3, origin_mm), np.eye(3), "int16")
+        assert len(entry_in_metres(case, header)) == count, "in mm it lies in the scan, or not"
 
 
 def test_a_clamp_is_borrowed_from_another_case(tmp_path: Path) -> None:
