@@ -25,6 +25,8 @@ WRITTEN_HERE: dict[str, Any] = {"not": {}}
 """JSON schema of a field that the program fills in and no user may write."""
 UNKNOWN = ("extra_forbidden", "unexpected_keyword_argument")
 LIMITS = {"exclusiveMinimum": "above", "minimum": "from", "exclusiveMaximum": "below", "maximum": "to"}
+SIGMAS = "case.uncertainty"
+"""The table whose keys are standard deviations of what other tables state."""
 VAST = 1e6  # bounds from here on guard against overflow: named only to a user who exceeds one
 KINDS = {"number": "a number", "integer": "a whole number", "boolean": "true or false", "string": "a text"}
 SEVERAL = {"number": "numbers", "integer": "whole numbers", "string": "texts", "object": "tables"}
@@ -143,15 +145,29 @@ def _node(schema: Schema, place: Place) -> tuple[Schema, bool]:
 
 def _no_such_key(schema: Schema, place: Place, found: Any) -> str:
     key, here = str(place[-1]), ".".join(part for part in place[:-1] if isinstance(part, str))
-    homes = {name: header for name, header, own in _tables(schema, schema) if _is_key(own.get(key), schema, found)}
-    if not homes:
-        return f": unknown key; {did_you_mean(key, _keys(schema, place[:-1]))}"
+    if isinstance(found, list) and found and isinstance(found[0], dict):
+        found = found[0]  # [[wall]] for [case.wall]
+    own = _keys(schema, place[:-1])
+    homes = {name: header for name, header, keys in _tables(schema, schema) if _is_key(keys.get(key), schema, found)}
+    if not homes or any(name.startswith(f"{key.lower()}_") for name in own):  # the latter lacks its unit alone
+        return f": unknown key; {did_you_mean(key, own)}"
+    if here == SIGMAS and isinstance(found, (int, float)) and "_sigma_" not in key:
+        sigma = _sigma_of(key, _keys(schema, place[:-2]))
+        known = sigma and f"how well it is known is {sigma} of [[case]]: write that above [{here}]"
+        return f": unknown key; {known or 'allowed: ' + ', '.join(sorted(own))}"
     if isinstance(found, dict):
         where = f"write {' or '.join(f'[{name}.{key}]' for name in homes)}"
     else:
         around = any(here.startswith(f"{name}.") for name in homes)
         where = f"write it above [{here}]" if around else "write it there"
-    return f": unknown key; it is a key of {' or '.join(homes.values())}: {where}"
+    told = [f"{header} (its standard deviation)" if name == SIGMAS else header for name, header in homes.items()]
+    return f": unknown key; it is a key of {' or '.join(told)}: {where}"
+
+
+def _sigma_of(key: str, names: Sequence[str]) -> str:
+    """Which of these keys is the standard deviation of another one, as roll_sigma_deg of roll_deg; empty for none."""
+    stem, _, unit = key.rpartition("_")
+    return next((name for name in names if name == f"{stem}_sigma_{unit}" or name.startswith(f"{key}_sigma_")), "")
 
 
 def _is_key(node: Schema | None, schema: Schema, found: Any) -> bool:

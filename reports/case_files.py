@@ -53,7 +53,8 @@ class CaseFiles:
     def points(self) -> pd.DataFrame:
         """Every compared point. By far the largest table: it is read here where ``read_case`` did not.
 
-        Raises UnreadableError where frames were compared and the file is gone.
+        Raises UnreadableError where frames were compared and the file is gone by then. Where ``read_case`` was to read
+        it and it was absent, the table is empty, as pages need it, which leave out what it would have shown.
         """
         if self.samples is not None:
             return self.samples

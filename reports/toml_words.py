@@ -3,7 +3,7 @@
 import re
 
 _PLACE = re.compile(r" \(at line (\d+), column \d+\)$")
-_COMMA = re.compile(r"= *([+-]?\d+),(\d+)")
+_COMMA = re.compile(r"= *([+-]?\d+),(\d+)\s*(?:#.*)?$")  # of several commas one may part thousands, or a list
 _AT_END = "end of document"
 _SHOWN = 60
 _VALUE = "a value is a number, true or false, a text in quotes, or a list in brackets"

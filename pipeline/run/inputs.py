@@ -67,8 +67,10 @@ def stated(case: Case) -> str:
 
 
 def keys_of(case: Case) -> dict[str, Any]:
-    """Every key of a case as it was read, defaults and calibrated parameters included, but wire and wall, which stand
-    beside it in result.json, and places of files.
+    """What the manifest states of a case, defaults included, with what parameters changed in it.
+
+    Not wire and wall, which stand beside it in result.json, what is filled in, as ``assumed``, nor files, of which
+    only the dataset, item, label or level is here.
     """
     beside = {key: parts for key in OF_FILES if (parts := _parts(getattr(case, key)))}
     return case.model_dump(exclude=UNSTATED | {"calibrated_kin", "wire", "wall"}) | beside

@@ -71,11 +71,19 @@ def command_line() -> list[str]:
     return ["wireval" if program == "__main__.py" else program, *sys.argv[1:]]
 
 
+def working_directory() -> str:
+    """Where relative paths are read from; empty where that folder was removed since this process went there."""
+    try:
+        return str(Path.cwd())
+    except FileNotFoundError:
+        return ""
+
+
 def this_run() -> dict[str, Any]:
     """Command line, working directory, machine and time of this run: no result depends on them, and they differ."""
     return {
         "argv": command_line(),
-        "cwd": str(Path.cwd()),
+        "cwd": working_directory(),
         "host": platform.node(),
         "system": platform.platform(),
         "processor": _processor(),

@@ -187,7 +187,7 @@ def result_of(case: Case, known: Known, summary: dict[str, Any], key: str, detai
     frames = [
         {
             "status": f.status,
-            "sentence": (f.ok and early) or f.sentence,
+            "sentence": early if early and f.status == FrameStatus.OK.identifier else f.sentence,
             "stage": f.stage,
             "message": message_of(f, known),
         }

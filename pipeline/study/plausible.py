@@ -45,16 +45,20 @@ def leads_out(case: Case, header: Header) -> list[str]:
     ]
 
 
-IN_METRES_MM = 0.05
-"""Largest coordinate of an entry in mm that may be one in metres: of the origin itself no doubt is told."""
+IN_METRES_MM = 1e-3, 0.05
+"""Largest coordinate of an entry in mm that may be one in metres, from and to: less is the origin itself, rounded."""
 
 
-def entry_in_metres(case: Case) -> list[str]:
-    """A sentence where an entry is so near the scanner's origin that it may be in metres."""
-    if not 0.0 < float(np.abs(case.entry_mm).max()) < IN_METRES_MM:
+def entry_in_metres(case: Case, header: Header | None) -> list[str]:
+    """A sentence where an entry is so near the scanner's origin that it may be in metres. header : of a scan."""
+    least, most = IN_METRES_MM
+    in_mm = 1e3 * np.asarray(case.entry_mm)
+    if not least <= float(np.abs(case.entry_mm).max()) < most:
         return []
-    in_mm = ", ".join(f"{1e3 * value:g}" for value in case.entry_mm)
-    return [f"entry_mm lies within {IN_METRES_MM:g} mm of 0, 0, 0: is it in metres ([{in_mm}] mm)?"]
+    if header is not None and np.any(header.grid.beyond_mm(in_mm) > 0.0):  # in mm it would lie in no scan
+        return []
+    told = ", ".join(f"{value:g}" for value in in_mm)
+    return [f"entry_mm lies within {most:g} mm of 0, 0, 0: is it in metres ([{told}] mm)?"]
 
 
 def loose_entry(case: Case) -> list[str]:
@@ -227,7 +231,7 @@ def in_case(case: Case, scan: Header | None) -> list[str]:
     """What is doubtful in a case beside its wire and its truth. scan : header of a scan of the case."""
     of_scan = [] if scan is None else [*other_voxels(scan), *lost_header(scan), *leads_out(case, scan)]
     said = [*forgotten_reference(case), *of_scan, *loose_entry(case), *odd_depths(case, scan), *wrapped_rolls(case)]
-    said += [*entry_in_metres(case), *odd_wall(case.wall), *odd_catheter(case.catheter)]
+    said += [*entry_in_metres(case, scan), *odd_wall(case.wall), *odd_catheter(case.catheter)]
     if scan is not None and case.frames and not case.traces:
         said += [*too_thin(case, scan), *slices_apart(scan)]
     return said

@@ -36,7 +36,7 @@ from reports.texts import UnreadableError
 from reports.two_runs import Verdict
 from solver import Catheter, Grid, GuideWire, Insertion, Insertions, Snap, Solution, Status, VesselWall, relax
 
-from ._arguments import require, require_truth, typed
+from ._arguments import require, typed, with_flags
 from .results import Results, read_results, read_run, wall_of
 
 __version__ = package_version()
@@ -86,7 +86,7 @@ def synth(scene: str, out: Place, **more: bool | float | str) -> Path:
     more : options of ``wireval synth``, such as ``frames=8`` or ``seed=3``.
     """
     given = require(scene=scene, out=out)
-    if "list" in more:
+    if more.get("list"):
         raise InputError(["list: it writes no study; `wireval synth --list` names the scenes, on the command line"])
     _carried_out("synth", given["scene"], out=given["out"], **more)
     return Path(given["out"]) / "manifest.toml"
@@ -184,7 +184,7 @@ def diff(first: Place, second: Place, *, tolerance: Place | None = None) -> Verd
 def _carried_out(verb: str, manifest: str, settings: object = None, **options: object) -> None:
     """Carry out the verb as typed with these options. A list repeats its option, True stands for one alone."""
     words = [verb, manifest]
-    require_truth(verb, options)
+    options = with_flags(verb, options)
     for key, wanted in (require(settings=settings, jobs=options.get("jobs"))["settings"] or {}).items():
         if isinstance(wanted, Mapping):
             flat = {f"{key}.{name}": value for name, value in wanted.items()}

@@ -6,6 +6,8 @@ from numbers import Integral
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from pipeline.cli import parsers
 from pipeline.status import InputError
 from pipeline.wording import shortened
@@ -114,16 +116,20 @@ def _taken(name: str, value: object, take: Callable[[object], Any], expected: st
     return found
 
 
-def require_truth(verb: str, options: Mapping[str, object]) -> None:
-    """Raise InputError for the first option without a value, as ``quiet``, that is neither True nor False.
+def with_flags(verb: str, options: Mapping[str, object]) -> dict[str, object]:
+    """The options; those without a value, as ``quiet``, as Python's own True, False or None, numpy's too.
 
-    Its value was an argument too many: "yes: not an option of wireval run".
+    Raises InputError for the first that is none of them: its value was an argument too many, "yes: not an option of
+    wireval run".
     """
-    known = parsers()[1][verb]._option_string_actions
+    known, taken = parsers()[1][verb]._option_string_actions, dict(options)
     for name, value in options.items():
         action = known.get(f"--{name.replace('_', '-')}")
-        if action is not None and action.nargs == 0 and not (value is None or isinstance(value, bool)):
-            raise InputError([f"{name}: got {shortened(repr(value), 80)}; expected True or False"])
+        if action is not None and action.nargs == 0 and value is not None:
+            if not isinstance(value, (bool, np.bool_)):
+                raise InputError([f"{name}: got {shortened(repr(value), 80)}; expected True or False"])
+            taken[name] = bool(value)
+    return taken
 
 
 def typed(name: str, value: object) -> str:

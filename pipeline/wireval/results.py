@@ -11,6 +11,7 @@ from typing import Any, NoReturn
 import numpy as np
 import pandas as pd
 
+from pipeline.run.provenance import working_directory
 from pipeline.run.results import Result, found_results
 from pipeline.status import InputError, did_you_mean
 from reports import tables
@@ -93,7 +94,8 @@ class Results:
         held: dict[str, Sized] = {"case": self.cases, "frame": self.errors, "failure": self.failures}
         counts = ", ".join(counted(len(of), name) for name, of in held.items())
         # as a user types it: the whole path of a notebook is of one machine
-        where = self.out.relative_to(Path.cwd()) if self.out.is_relative_to(Path.cwd()) else self.out
+        here = working_directory()
+        where = self.out.relative_to(here) if self.out.is_relative_to(here) else self.out
         return "\n".join([f"Results of {where}: {counts}", f"{rows}{more}", *self._amiss()])
 
     def _repr_html_(self) -> str:

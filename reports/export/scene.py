@@ -35,8 +35,9 @@ class _Thing(NamedTuple):
 
 def wire_name(kind: str, frame: int, status: str) -> str:
     """What 3D Slicer calls a wire. status : of its frame, which is named where the wire counts in no score."""
-    refused = kind != "true" and status not in GOOD
-    return f"{kind} {frame:03d}" + f" (refused: {status})" * refused
+    # not "refused": where the simulation failed, the traced wire is none the worse
+    doubtful = kind != "true" and status not in GOOD
+    return f"{kind} {frame:03d}" + f" (frame not ok: {status})" * doubtful
 
 
 def write_scene(
@@ -44,14 +45,14 @@ def write_scene(
     shown: int,
     scans: Mapping[str, Path] | None = None,
     said: str = "",
-    refused: Mapping[int, str] = MappingProxyType({}),
+    not_ok: Mapping[int, str] = MappingProxyType({}),
 ) -> Path | None:
     """Write scene.mrml over the files of ``folder``, frame ``shown`` switched on; None where there is none of them.
 
     scans : by name, which 3D Slicer reads as they are.     said : what a reader of the scene should know of them.
-    refused : statuses of the frames that are not ok.
+    not_ok : statuses of the frames that are not.
     """
-    things = list(_things(folder, shown, refused))
+    things = list(_things(folder, shown, not_ok))
     if not things:
         return None
     root = ET.Element("MRML", version="Slicer5.0.0", userTags="")
@@ -76,7 +77,7 @@ def write_scene(
     return path
 
 
-def _things(folder: Path, shown: int, refused: Mapping[int, str]) -> Iterator[_Thing]:
+def _things(folder: Path, shown: int, not_ok: Mapping[int, str]) -> Iterator[_Thing]:
     files = sorted(path.name for path in folder.glob("[!.]*"))
     if "lumen.vtp" in files:
         glass = {"color": _triple(colours.LUMEN), "opacity": "0.3", "visibility": "true", "backfaceCulling": "false"}
@@ -88,7 +89,7 @@ def _things(folder: Path, shown: int, refused: Mapping[int, str]) -> Iterator[_T
         if found := _WIRE.fullmatch(file):
             kind, frame, ending = found.groups()
             seen = "true" if int(frame) == shown and ending == "vtp" else "false"
-            name = wire_name(kind, int(frame), refused.get(int(frame), "ok"))
+            name = wire_name(kind, int(frame), not_ok.get(int(frame), "ok"))
             look = {"color": _triple(colours.WIRES[kind]), "visibility": seen}
             if ending == "vtp":
                 yield _Thing("Model", "ModelStorage", name, file, look | {"lineWidth": "4"})

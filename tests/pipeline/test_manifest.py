@@ -208,7 +208,8 @@ def test_a_table_of_a_case_at_the_top_is_told_where_it_belongs(tmp_path: Path) -
     [
         (
             f"{GOOD}friction = 0.1\n",
-            "case 'run1' friction: unknown key; it is a key of [case.wall] or [case.uncertainty]: write it there",
+            "case 'run1' friction: unknown key; it is a key of [case.wall] or [case.uncertainty] (its standard "
+            "deviation): write it there",
         ),
         (
             f'{GOOD}[case.wall]\ntruth = "truth.json"\n',
@@ -219,6 +220,15 @@ def test_a_table_of_a_case_at_the_top_is_told_where_it_belongs(tmp_path: Path) -
         (f"{GOOD}[wire.wire]\nradius_mm = 0.2\n", "wire: unknown key; did you mean 'wires'?"),
         (f'{GOOD}entry = "case:other"\n', "no such case; this is the only case: leave entry out"),
         (GOOD.replace("run1", "für"), "expected up to 100 of A-Z, a-z, 0-9 and . _ -"),
+        (
+            GOOD.replace("[wires.soft]", "[wires.soft]\nrest_curvature = 0.1"),
+            "rest_curvature: unknown key; did you mean 'rest_curvature_per_mm'?",
+        ),
+        (
+            GOOD.replace("[wires.soft]", "[wires.soft]\ntaper = 0.1"),
+            "taper: unknown key; it is a key of [case.uncertainty] (its standard deviation): write it there",
+        ),
+        (f"{GOOD}[[wall]]\nfriction = 0.1\n", "wall: unknown key; it is a key of [[case]]: write [case.wall]"),
         (GOOD.replace("radius_mm = 0.18", "radius_mm = 0,18"), "decimals with a point: 0.18"),
     ],
 )
@@ -227,13 +237,35 @@ def test_a_key_of_another_table_is_told_with_that_table(tmp_path: Path, text: st
     assert told in problems(tmp_path, text)
 
 
+@pytest.mark.parametrize(
+    ("line", "told"),
+    [
+        ("roll_deg = 5", "how well it is known is roll_sigma_deg of [[case]]: write that above [case.uncertainty]"),
+        ("insertion_mm = 0.5", "how well it is known is insertion_sigma_mm of [[case]]: write that above [case."),
+        ("entry_direction = 2", "how well it is known is entry_direction_sigma_deg of [[case]]: write that above"),
+        ("entry_sigma_mm = 0.2", "it is a key of [[case]]: write it above [case.uncertainty]"),
+        ("push_force_N = [1, 2]", "it is a key of [[case]]: write it above [case.uncertainty]"),
+        ("lumen = 0.1", "did you mean 'lumen_mm'?"),
+        ("radius_mm = 0.01", "allowed: friction, lumen_bias_mm, lumen_mm"),
+    ],
+)
+def test_a_value_among_standard_deviations_is_sent_to_its_own(tmp_path: Path, line: str, told: str) -> None:
+    """A roll known to 5 degrees, written there, "is a key of [[case]]: write it above": that turns the wire by 5."""
+    said = problems(tmp_path, f"{GOOD}[case.uncertainty]\n{line}\n")
+    assert f"uncertainty {line.partition(' ')[0]}: unknown key; {told}" in said
+
+
 def test_an_entry_in_metres_is_asked_about(tmp_path: Path) -> None:
     """Of an entry 8 mm from the origin, written in metres, check found nothing."""
     text = GOOD.replace("[1.0, 2.0, 3.0]", "[0.000012, -0.000137, -0.00794]")
     (case,) = read_manifest(written(tmp_path, text)).cases
-    (told,) = entry_in_metres(case)
+    (told,) = entry_in_metres(case, None)
     assert told == "entry_mm lies within 0.05 mm of 0, 0, 0: is it in metres ([0.012, -0.137, -7.94] mm)?"
-    assert entry_in_metres(case.model_copy(update={"entry_mm": (0.0, 0.0, 0.0)})) == []
+    for at in ((0.0, 0.0, 0.0), (1.2e-16, 0.0, 0.0)):
+        assert entry_in_metres(case.model_copy(update={"entry_mm": at}), None) == [], "the origin, as it was rounded"
+    for origin_mm, count in ((-10.0, 1), (0.0, 0)):
+        header = Header(Source(tmp_path), (96,) * 3, np.full(3, 0.5), np.full(3, origin_mm), np.eye(3), "int16")
+        assert len(entry_in_metres(case, header)) == count, "in mm it lies in the scan, or not"
 
 
 def test_a_clamp_is_borrowed_from_another_case(tmp_path: Path) -> None:

@@ -22,23 +22,25 @@ from PIL import Image
 
 from pipeline.cli import main
 from pipeline.model import Clamp, Curve
-from pipeline.run import cache, ledger
+from pipeline.run import cache, ledger, results
 from pipeline.run.aggregate import aggregate
 from pipeline.run.cache import decoded
 from pipeline.run.case import Job, run_case
 from pipeline.run.results import found_results
 from pipeline.run.stages import simulate
 from pipeline.run.stages.compare import _trusted_before
-from pipeline.run.stages.known import Frame
+from pipeline.run.stages.known import Frame, Known
 from pipeline.simulate import wall_of
 from pipeline.status import FrameStatus
 from pipeline.study import own_lumen
+from pipeline.study.manifest import read_manifest
 from reports import tables
 from reports.colours import TRACED, TRUE, rgb
 from reports.frames_file import read_scan
 from reports.run_page import render_index
 from reports.schema import ERRORS, POINTS, SUMMARY, TIMINGS
 from solver import Status
+from tests.pipeline.test_simulate import MANIFEST
 from tests.studies.trees import differences
 
 SIZE, FRAMES = 64, 4
@@ -416,6 +418,19 @@ def test_nothing_of_an_earlier_run_stays_beside_a_new_result(
     left = {p.name for p in (out / "cases" / "bifurcation").iterdir()}
     assert not left & {"points.csv.gz", "report.html", "figures", "scene3d.html"}
     assert not list((out / "cases" / "bifurcation" / "view").glob("wire_simulated*"))
+
+
+def test_a_frame_that_the_roll_was_fitted_on_says_so_however_early_the_run_ends(tmp_path: Path) -> None:
+    """Its sentence was "nothing failed up to where the run was to end"."""
+    (tmp_path / "manifest.toml").write_text(MANIFEST, encoding="utf-8")
+    (case,) = read_manifest(tmp_path / "manifest.toml").cases
+    fitted = Frame(0, status=FrameStatus.ROLL_FITTED.identifier, sentence=FrameStatus.ROLL_FITTED.value)
+    summary = {"case": case.id, "status": "ok", "frames": 2, "frames_ok": 1}
+    details = {"until": "simulate", "inputs": []}
+    found = results.result_of(case, Known(frames=(fitted, Frame(1))), summary, "", details)
+    first, second = (frame["sentence"] for frame in found.frames)
+    assert first == FrameStatus.ROLL_FITTED.value
+    assert second.startswith("nothing failed up to")
 
 
 def test_the_page_of_a_case_without_a_lumen_shows_the_scan_at_the_entry(folder: Path, tmp_path: Path) -> None:

@@ -19,7 +19,7 @@ import pytest
 import wireval
 from pipeline.cli import main
 from pipeline.load.geometry import LoadError
-from pipeline.run.provenance import package_version
+from pipeline.run.provenance import package_version, this_run
 from pipeline.status import FrameStatus
 from pipeline.study.manifest import ManifestError
 from reports.atomic import WriteError
@@ -315,6 +315,18 @@ def test_results_are_of_their_folder_wherever_the_script_goes(tmp_path: Path, mo
             read()
 
 
+def test_a_working_directory_may_have_been_removed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A run from there, and a prompt that shows its results, ended in a traceback."""
+    write_run(tmp_path / "out", [FakeCase("c", frames=1)])
+    (tmp_path / "gone").mkdir()
+    monkeypatch.chdir(tmp_path / "gone")
+    (tmp_path / "gone").rmdir()
+    assert this_run()["cwd"] == ""
+    with pytest.warns(UserWarning, match="ledger.json is missing"):
+        results = wireval.read_results(tmp_path / "out")
+    assert repr(results).startswith(f"Results of {tmp_path / 'out'}: ")
+
+
 def replayed_mm(case: wireval.CaseFiles) -> float:
     """How far the solver alone lays the wire in the case's wall from where the run laid it, rms of the worst frame."""
     held, stated, rows = case.result["entry"], case.result["wire"], case.errors
@@ -438,6 +450,15 @@ def test_what_synth_prints_is_no_study(tmp_path: Path) -> None:
     """It returned the path of a manifest that is not there."""
     with pytest.raises(wireval.InputError, match="list: it writes no study; `wireval synth --list` names the scenes"):
         wireval.synth("straight", tmp_path / "study", list=True)
+
+
+@pytest.mark.parametrize("off", [False, None, np.False_])
+def test_flags_may_be_off_and_of_numpy(tmp_path: Path, off: object) -> None:
+    """list=False, which is off like any other flag, and quiet=np.True_ were refused."""
+    with pytest.raises(wireval.InputError, match="frames: got 0; allowed: 1 or more"):
+        wireval.synth("bend", tmp_path / "study", frames=0, list=off)  # type: ignore[arg-type]
+    with pytest.raises(wireval.InputError, match="no such"):
+        wireval.run(tmp_path / "none.toml", tmp_path / "out", quiet=np.True_, fresh=off)
 
 
 def test_settings_may_be_numbers_of_numpy(tmp_path: Path) -> None:

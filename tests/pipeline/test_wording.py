@@ -179,3 +179,13 @@ def test_no_words_of_a_parser(text: str, said: str) -> None:
         tomllib.loads(text)
     assert not_toml("f.toml", text, caught.value).startswith(said)
     assert not_toml("f.toml", text, RecursionError("too deep")).startswith("f.toml: not valid TOML; a line is")
+
+
+@pytest.mark.parametrize(
+    ("line", "point"), [("a = 0,18", "0.18"), ("a = -1,5  # mm", "-1.5"), ("a = 1,000.5", ""), ("a = 1,2,3", "")]
+)
+def test_a_decimal_comma_is_told_only_where_it_is_one(line: str, point: str) -> None:
+    """Of 1,000.5 it said "write decimals with a point: 1.000", of 1,2,3, which lacks brackets, 1.2."""
+    with pytest.raises(tomllib.TOMLDecodeError) as caught:
+        tomllib.loads(line)
+    assert not_toml("f.toml", line, caught.value).partition("decimals with a point: ")[2] == point

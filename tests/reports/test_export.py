@@ -226,13 +226,14 @@ def test_the_scene_opens_everything_with_names_and_colours(tmp_path: Path) -> No
     assert export.write_scene(tmp_path / "nothing", 0) is None
 
 
-def test_wires_of_refused_frames_are_called_so(tmp_path: Path) -> None:
+def test_wires_of_frames_that_are_not_ok_are_called_so(tmp_path: Path) -> None:
     """They stood among the others, in the same colours and with plain names."""
-    path = export.write_scene(_view(tmp_path), shown=2, refused={2: "trace_low_contrast"})
+    path = export.write_scene(_view(tmp_path), shown=2, not_ok={2: "trace_low_contrast"})
     assert path is not None
     names = {node.get("name") for node in ET.parse(path).getroot()}
-    assert names >= {"traced 000", "traced 002 (refused: trace_low_contrast)", "traced 010, curve"}
-    assert "simulated 002 (refused: trace_low_contrast), curve" in names
+    assert names >= {"traced 000", "traced 002 (frame not ok: trace_low_contrast)", "traced 010, curve"}
+    assert "simulated 002 (frame not ok: trace_low_contrast), curve" in names
+    assert export.wire_name("traced", 3, "max_iterations") == "traced 003 (frame not ok: max_iterations)", "was refused"
     assert export.wire_name("true", 2, "trace_low_contrast") == "true 002"
     assert export.wire_name("simulated", 1, "roll_fitted") == "simulated 001"
 
