@@ -70,7 +70,7 @@ MOVED = (
     Column("how", "-", "along the wire or across it; of the wall below 0: away from the wire, a wider lumen", "text"),
     Column("moved", "-", "from what is stated, in mm, of direction and roll in degrees"),
     Column("sd", "-", "one standard deviation", "text"),
-    Column("prior", "-", "one standard deviation of what is stated, in a run as in a fit", "text"),
+    Column("prior", "-", "one standard deviation that the fit starts from: stated, or taken where nothing is", "text"),
 )
 BEYOND = 3.0
 """Prior standard deviations beyond which a number of an insertion is marked."""
