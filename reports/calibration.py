@@ -72,8 +72,6 @@ MOVED = (
     Column("sd", "-", "one standard deviation", "text"),
     Column("prior", "-", "one standard deviation that the fit starts from: stated, or taken where nothing is", "text"),
 )
-BEYOND = 3.0
-"""Prior standard deviations beyond which a number of an insertion is marked."""
 PLANNED = (
     COLUMNS[0],
     Column("sd", "-", "one standard deviation as the planned study would find it; " + OF_FACTORS, "text"),
@@ -131,12 +129,7 @@ def _moved(rows: Sequence[Mapping[str, Any]]) -> Grid | None:
         }
         for row in rows
     ]
-    return grid(
-        pd.DataFrame(told),
-        MOVED,
-        bad=[abs(row["value"]) > BEYOND * row["prior_sd"] > 0.0 for row in rows],
-        nothing=NOTHING,
-    )
+    return grid(pd.DataFrame(told), MOVED, bad=[row["beyond"] for row in rows], nothing=NOTHING)
 
 
 def _of_the_traces(record: Mapping[str, Any]) -> str:
