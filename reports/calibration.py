@@ -92,6 +92,7 @@ def render_calibration(out: Path) -> Path:
         "used": record["used"],
         "insertions": counted(len({one["group"] for one in record["used"]}), "insertion"),
         "unseen": unseen,
+        "reservations": record["reservations"],
         "doubted": [row for row in rows if row["seen"] and row["why"]],
         "moved": _moved(record.get("insertions", [])),
         "traces": _of_the_traces(record),

@@ -34,7 +34,15 @@ from pipeline.run.cache import Store
 from pipeline.run.calibrated import as_calibrated, data_of
 from pipeline.run.calibrated_wire import wire_rows
 from pipeline.run.calibration import SAME_MM, CalibrationError, depth_offset, design, gathered, over_insertions
-from pipeline.run.calibration_files import _walls_known, contradicted, estimates_of, flattened, misfit, no_common_roll
+from pipeline.run.calibration_files import (
+    _walls_known,
+    contradicted,
+    estimates_of,
+    flattened,
+    misfit,
+    no_common_roll,
+    reservation,
+)
 from pipeline.run.inputs import described, other_file, stated, times_of
 from pipeline.run.log import Log
 from pipeline.run.outputs import error_row, summary_row
@@ -443,7 +451,7 @@ def test_a_misfit_is_told():
     one = trial()
     fit = calibrated(all_of(one)[:1], [Evidence(one)], SETTINGS)
     assert misfit(replace(fit, scale=1.0)) == []
-    assert "lumen, stated rolls" in misfit(replace(fit, scale=9.0))[0]
+    assert "lumen, the wire's profile" in misfit(replace(fit, scale=9.0))[0]
 
 
 def test_a_misfit_names_what_is_stated_as_exact(at_truth):
@@ -453,7 +461,22 @@ def test_a_misfit_names_what_is_stated_as_exact(at_truth):
     fit: Any = SimpleNamespace(fit=replace(at_truth, problem=replace(problem, evidence=(held,))), scale=9.0)
     assert "to be off: entry_direction of t (stated as exact), lumen, stated rolls" in misfit(fit)[0]
     fit.fit = at_truth
-    assert "to be off: roll_deg of t (stated as exact), lumen, stated rolls" in misfit(fit)[0]
+    told = "to be off: roll_deg of t (stated as exact), lumen, "
+    assert f"{told}the wire's profile or" in misfit(fit)[0], "the rolls were named twice"
+    other = replace(problem.evidence[0].trial, name="o", group="o", roll_sigma_deg=5.0)
+    fit.fit = replace(at_truth, problem=replace(problem, evidence=(*problem.evidence, Evidence(other))))
+    assert f"{told}other stated rolls, the wire's profile or" in misfit(fit)[0]
+
+
+def test_a_roll_that_is_not_common_is_told_in_the_warning(monkeypatch, at_truth):
+    """Which insertion wants how much stood in the parameter's row, and again as a warning."""
+    monkeypatch.setattr(calibration_files, "depth_offset", lambda *_: (0.0, np.nan))
+    roll = next(u for u in unknowns([], 0.0, weighed=False) if u.name == ROLL)
+    apart = "the insertions want no common one: b wants 12 degrees more than a"
+    estimate = Estimate(roll, 0.0, 5.0, 0.0, False, apart, ())
+    fit: Any = SimpleNamespace(estimates=[estimate], scale=1.0, fit=at_truth, apart=apart)
+    assert estimates_of(of_voxels(0.3), fit)[0]["why"] == "the insertions want no common one: see the warning"
+    assert no_common_roll(fit) == [f"{ROLL}: {apart}"]
 
 
 def test_what_is_seen_under_a_misfit_says_so_and_what_ends_at_its_bound(monkeypatch, at_truth):
@@ -462,15 +485,16 @@ def test_what_is_seen_under_a_misfit_says_so_and_what_ends_at_its_bound(monkeypa
     unknown = {u.name: u for u in unknowns([], 0.0, weighed=False)}
     rows = [Estimate(unknown[TAPER], 0.0, 0.5, 0.0, False, "little is known", ())]
     rows.append(Estimate(unknown[FRICTION], 0.0, 0.0092, 0.0, True, "", ()))
-    fit: Any = SimpleNamespace(estimates=rows, scale=1.0, fit=at_truth)
-    assert [row["why"] for row in estimates_of(of_voxels(0.3), fit)][:2] == [
+    rows.append(Estimate(unknown[REST], 0.0, 0.1, 0.1, True, "", ()))
+    fit: Any = SimpleNamespace(estimates=rows, scale=1.0, fit=at_truth, apart="")
+    assert reservation(fit) == []
+    fit.scale = 9.0
+    assert [row["why"] for row in estimates_of(of_voxels(0.3), fit)][:3] == [
         "little is known",
         "0 is the end of what is possible: at most 0.0092, to one side",
+        "",  # what holds of all is said once, and hides no value of all parameters free
     ]
-    fit.scale = 9.0
-    found = estimates_of(of_voxels(0.3), fit)
-    assert found[0]["why"] == "little is known"
-    assert "to one side; only if all else is right" in found[1]["why"]
+    assert reservation(fit)[0].startswith("what is seen holds only if all else is right")
 
 
 def with_wall_moved(fit: Fit, mm: float) -> Fit:
@@ -1037,7 +1061,7 @@ def test_what_a_thin_wire_is_flattened_by_is_in_the_standard_deviation(monkeypat
     monkeypatch.setattr(calibration_files, "depth_offset", lambda *_: (0.0, np.nan))
     unknown = {u.name: u for u in unknowns([], 0.0, weighed=False)}
     rows = [Estimate(unknown[name], 0.0, 0.02, 0.0, True, "", ()) for name in (REST, TAPER)]
-    fit: Any = SimpleNamespace(estimates=rows, scale=1.0)
+    fit: Any = SimpleNamespace(estimates=rows, scale=1.0, apart="")
     for voxel_mm, sd in ((0.375, 0.02), (0.75, np.hypot(0.02, 0.09)), (0.5, np.hypot(0.02, 0.02))):
         rest, taper, _ = estimates_of(of_voxels(voxel_mm), fit)
         assert rest["sd"] == pytest.approx(sd, rel=0.01)

@@ -79,6 +79,7 @@ def _calibration(folder: Path) -> Path:
         "frames": frames,
         "insertions": [wall | {"beyond": True}, exact | {"beyond": False}],
         "starts": [[0.5, 57.0]],
+        "reservations": ["what is seen holds only if all else is right"],
         "scale": 1.0,
         "used": [{"case": "a", "group": "a"}],
         "warnings": ["the calibrated wires lie 3.0 times as far from the traces as these are taken to be off"],
