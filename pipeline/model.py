@@ -76,7 +76,9 @@ class Wall:
 
 @dataclass(frozen=True)
 class Uncertainty:
-    """How well inputs are known: one standard deviation of each; None is the default of ``budget.inputs``.
+    """How well inputs are known: one standard deviation of each.
+
+    None is a default: of ``budget.inputs`` in a run, of ``calibrate.trials`` (the lumen's) in a fit.
 
     lumen_mm, lumen_bias_mm : of the lumen's surface, place by place and common to
     all of it.     Relative: rest_curvature; taper (lengths over which the stiffness changes) and wall_stiffness, of

@@ -24,6 +24,8 @@ FACTOR_FROM = 0.3
 OF_FACTORS = "of a factor in percent, or, where it is large, as what to multiply and to divide the value by"
 GAINED = 0.98
 """Error after calibrating over the one before from which the wires are not called nearer."""
+STATED_AND_FITTED, AS_GIVEN = ["before_mm", "after_mm"], "as_given_mm"
+"""Columns of a frame's distances, mm."""
 TURNED = {
     "as_calibrated": " with each insertion turned for itself",
     "in_both": ", each insertion turned for itself in both",
@@ -68,10 +70,8 @@ MOVED = (
     Column("how", "-", "along the wire or across it; of the wall below 0: away from the wire, a wider lumen", "text"),
     Column("moved", "-", "from what is stated, in mm, of direction and roll in degrees"),
     Column("sd", "-", "one standard deviation", "text"),
-    Column("prior", "-", "one standard deviation of what is stated, in a run as in a fit", "text"),
+    Column("prior", "-", "one standard deviation that the fit starts from: stated, or taken where nothing is", "text"),
 )
-BEYOND = 3.0
-"""Prior standard deviations beyond which a number of an insertion is marked."""
 PLANNED = (
     COLUMNS[0],
     Column("sd", "-", "one standard deviation as the planned study would find it; " + OF_FACTORS, "text"),
@@ -92,6 +92,7 @@ def render_calibration(out: Path) -> Path:
         "used": record["used"],
         "insertions": counted(len({one["group"] for one in record["used"]}), "insertion"),
         "unseen": unseen,
+        "reservations": record["reservations"],
         "doubted": [row for row in rows if row["seen"] and row["why"]],
         "moved": _moved(record.get("insertions", [])),
         "traces": _of_the_traces(record),
@@ -129,12 +130,7 @@ def _moved(rows: Sequence[Mapping[str, Any]]) -> Grid | None:
         }
         for row in rows
     ]
-    return grid(
-        pd.DataFrame(told),
-        MOVED,
-        bad=[abs(row["value"]) > BEYOND * row["prior_sd"] > 0.0 for row in rows],
-        nothing=NOTHING,
-    )
+    return grid(pd.DataFrame(told), MOVED, bad=[row["beyond"] for row in rows], nothing=NOTHING)
 
 
 def _of_the_traces(record: Mapping[str, Any]) -> str:
@@ -196,21 +192,33 @@ def gained(frames: Sequence[Mapping[str, Any]]) -> str:
 
     Rolls that are stated 40 degrees off were "as stated" 0.06 mm, which a run as stated is not: it turns no insertion.
     """
-    known = pd.DataFrame(frames, columns=["depth_mm", "before_mm", "after_mm"]).astype(float).dropna()
-    if known.empty:
+    every = pd.DataFrame(frames, columns=["depth_mm", *STATED_AND_FITTED, AS_GIVEN]).astype(float)
+    rest = every.dropna(subset=STATED_AND_FITTED)
+    if rest.empty:
         return ""
-    before, after = (_rms_mm(known, name) for name in ("before_mm", "after_mm"))
+    # of the same frames, since those that come to rest in one of the three alone are the worst of the others
+    known = rest.dropna() if rest[AS_GIVEN].notna().any() else rest
+    before, after = (_rms_mm(known, name) for name in STATED_AND_FITTED)
     said = "" if after < GAINED * before else ": no nearer" if after < before / GAINED else ": farther away"
     turned = {str(frame.get("turned", "")) for frame in frames}
     alone = next((words for where, words in TURNED.items() if where in turned), "")
-    given = pd.DataFrame(frames, columns=["depth_mm", "as_given_mm"]).astype(float).dropna()
-    walls = (
-        "" if given.empty else f"; with the walls as they are given it is {number(_rms_mm(given, 'as_given_mm'))} mm"
-    )
     return (
         f"the wires of {counted(len(known), 'fitted frame')} lie {number(before)} mm rms from their traces as stated, "
-        f"{number(after)} mm as calibrated{alone}{said}; clamps and walls are fitted to both{walls}"
+        f"{number(after)} mm as calibrated{alone}{said}; clamps and walls are fitted to both"
+        f"{_as_given(known)}{_lost(len(every) - len(known))}"
     )
+
+
+def _as_given(known: pd.DataFrame) -> str:
+    """What is said of the wires with the walls as they are given."""
+    if known[AS_GIVEN].isna().any():
+        return "; with the walls as they are given none of these wires comes to rest"
+    return f"; with the walls as they are given it is {number(_rms_mm(known, AS_GIVEN))} mm"
+
+
+def _lost(frames: int) -> str:
+    """What is said of frames that have not all of these distances."""
+    return f"; left out: {counted(frames, 'frame')} whose wires do not come to rest each time" * bool(frames)
 
 
 def _rms_mm(frames: pd.DataFrame, name: str) -> float:

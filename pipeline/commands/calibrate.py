@@ -55,7 +55,7 @@ def _fit(args: argparse.Namespace, cases: "tuple[Case, ...]", config: "Config", 
     """Fit, write, and say what was found."""
     from pipeline.calibrate.unknowns import spread_in_words
     from pipeline.run.calibration import calibrate, gathered
-    from pipeline.run.calibration_files import segments_said, warnings_of, write_parameters, write_record
+    from pipeline.run.calibration_files import reservation, segments_said, warnings_of, write_parameters, write_record
     from reports.calibration import gained, render_calibration, to_its_digits
 
     found = gathered(cases, config, store, (lambda _: None) if args.quiet else say)
@@ -66,6 +66,8 @@ def _fit(args: argparse.Namespace, cases: "tuple[Case, ...]", config: "Config", 
     before = file.read_bytes() if file.exists() else b""
     written = write_parameters(file, found, fit)
     write_record(args.out / "calibration.json", found, fit)
+    for text in reservation(fit):
+        say(text)
     for one in written.estimate:
         sd = spread_in_words(one.sd, logarithmic=one.logarithmic)
         fitted, used = (to_its_digits(vars(one), key) for key in ("value", "used"))

@@ -9,6 +9,7 @@ import numpy as np
 
 from pipeline.calibrate.design import Predicted
 from pipeline.calibrate.estimates import Calibration, Estimate
+from pipeline.calibrate.insertions import ROLL as STATED_ROLL
 from pipeline.calibrate.insertions import beyond_their_priors, moved_of, stated_as_exact
 from pipeline.calibrate.unknowns import BENDING, FRICTION, REST, ROLL, TAPER, WALL, Unknown, bent, lacking, wall_factor
 from pipeline.model import Wire
@@ -23,8 +24,9 @@ from reports.atomic import write_text
 DEPTH = Unknown("depth_offset_mm", 0.0, 5.0, -np.inf, np.inf, 0.0, 0.25, "mm added to stated depths")
 """What is not fitted, but taken from the depths that a fit leaves."""
 MISFIT = 2.0
-IF_RIGHT = "only if all else is right, which the misfit denies: see the warnings"
-"""Beside what is seen where the wires do not meet the traces: of a shaft stated as soft as the tip a wall was 0.06."""
+IF_RIGHT = "what is seen holds only if all else is right, which the misfit denies: see the warnings"
+"""Above what is seen where the wires do not meet the traces: of a shaft stated as soft as the tip a wall was 0.06."""
+APART = "the insertions want no common one: see the warning"
 ADVICE = {
     ROLL: "a tip with a curve, seen free of the wall; a frame whose tip does not touch tells the roll best",
     REST: "frames in which the tip lies free; a tip that is pressed straight shows little of its curve",
@@ -45,11 +47,10 @@ def _advice(name: str, wire: Wire) -> str:
 
 def estimates_of(found: Gathered, fit: Calibration) -> list[dict[str, Any]]:
     """Rows of all parameters, the depth offset among them."""
-    none = lacking(found.cases[0].wire)
-    every = (*fit.estimates, _depth(found, fit))
-    rows = [_row(e) | ({"why": none[e.unknown.name][0]} if e.unknown.name in none else {}) for e in every]
-    if misfit(fit):
-        rows = [row | {"why": "; ".join(filter(None, [row["why"], IF_RIGHT * row["seen"]]))} for row in rows]
+    why = {name: {"why": told} for name, (told, _) in lacking(found.cases[0].wire).items()}
+    if fit.apart:
+        why[ROLL] = {"why": APART}
+    rows = [_row(e) | why.get(e.unknown.name, {}) for e in (*fit.estimates, _depth(found, fit))]
     off = float(np.mean([_too_flat(voxels) for voxels in _thickness(found).values()] or [0.0]))
     return [row | {"sd": float(np.hypot(row["sd"], off))} if row["name"] == REST else row for row in rows]
 
@@ -75,6 +76,7 @@ def write_parameters(path: Path, found: Gathered, fit: Calibration) -> Parameter
     walls = sorted({case.wall.stiffness_N_mm2 for case in found.cases})
     lines = [
         "# written by wireval calibrate; taken by `parameters` in a case or by --parameters FILE",
+        *(f"# {text}" for text in reservation(fit)),
         "schema = 1",
         f"wire = {json.dumps(wire.name)}",
         f"bending_stiffness_N_mm2 = {_text(wire.bending_stiffness_N_mm2)}",
@@ -118,12 +120,21 @@ def misfit(fit: Calibration) -> list[str]:
     times = float(np.sqrt(fit.scale))
     if times < MISFIT:
         return []
-    exact = [f"{name} of {', '.join(cases)} (stated as exact)" for name, cases in stated_as_exact(fit.fit).items()]
+    held = stated_as_exact(fit.fit)
+    exact = [f"{name} of {', '.join(cases)} (stated as exact)" for name, cases in held.items()]
+    trials = [one.trial for one in fit.fit.problem.evidence]
+    rolls = "other stated rolls" if STATED_ROLL in held else "stated rolls"
+    rolled = [rolls] * any(trial.turned and not trial.roll_free for trial in trials)
     return [
         f"the calibrated wires lie {times:.1f} times as far from the traces as these are taken to be off: "
-        f"{', '.join([*exact, 'lumen'])}, stated rolls, the wire's profile or a trace is wrong; standard deviations "
+        f"{', '.join([*exact, 'lumen', *rolled])}, the wire's profile or a trace is wrong; standard deviations "
         "are widened, values may be off beyond them"
     ]
+
+
+def reservation(fit: Calibration) -> list[str]:
+    """What is said once, above all parameters."""
+    return [IF_RIGHT] * bool(misfit(fit))
 
 
 def no_common_roll(fit: Calibration) -> list[str]:
@@ -231,6 +242,7 @@ def write_record(path: Path, found: Gathered, fit: Calibration) -> None:
         "stated": fit.fit.problem.stated,
         "used": _used_by(found),
         "segment_mm": fit.segments.mm,
+        "reservations": reservation(fit),
         "warnings": [*warnings_of(found, fit), *found.left_out],
         "notes": [segments_said(fit), *_together(found), *_walls_known(found), *found.notes],
         "provenance": code_state(),

@@ -1,6 +1,7 @@
 """A figure from nothing to its files, without display or pyplot: made, its panels furnished, saved as PNG and CSV."""
 
 import io
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -110,9 +111,14 @@ def lattice(
     return figure, panels[:count]
 
 
-def drawn_name(name: str) -> str:
-    """A case's name as it is drawn: of a long one its beginning and end, where those of one study differ."""
-    return name if len(name) <= LONGEST_NAME else f"{name[: LONGEST_NAME - 13]}\u2026{name[-12:]}"
+def drawn_names(names: Sequence[str]) -> list[str]:
+    """The names of a figure's cases as they are drawn: of a long one its beginning and end.
+
+    Those that are the same then, as ids that differ in their middle are, have their place in the figure in front.
+    """
+    short = [name if len(name) <= LONGEST_NAME else f"{name[: LONGEST_NAME - 13]}\u2026{name[-12:]}" for name in names]
+    count = Counter(short)
+    return [f"{place}: {name}" if count[name] > 1 else name for place, name in enumerate(short, 1)]
 
 
 def plain(axes: Axes) -> None:

@@ -40,11 +40,11 @@ def contact_along_wire(case: CaseFiles) -> Drawing | None:
     if drawing is None:
         return None
     # the wires of refused frames are shown, too: with the cross that the map of a run has for such a frame
-    status = drawing.table["frame"].map(case.errors.set_index("frame")["status"])
-    refused = drawing.table["frame"][~status.isin(GOOD)].unique()
+    rows = case.errors.loc[case.errors["frame"].isin(list(drawing.frames[0].of_frame)), ["frame", "status"]]
+    refused = rows["frame"][~rows["status"].isin(GOOD)].to_numpy()
     if len(refused):
         drawing.figure.axes[0].plot(0.0 * refused, refused, "x", color=BAD, markersize=7, clip_on=False, zorder=5)
-    return replace(drawing, table=drawing.table.assign(status=status))
+    return replace(drawing, table=drawing.table.merge(rows, on="frame", how="outer"))
 
 
 def _joints(case: CaseFiles) -> pd.DataFrame:

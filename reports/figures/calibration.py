@@ -11,7 +11,7 @@ from reports.colours import SIMULATED
 from reports.figures._drawing import (
     LOG_FROM_RATIO,
     Drawing,
-    drawn_name,
+    drawn_names,
     lattice,
     legend,
     new_figure,
@@ -107,13 +107,13 @@ def residuals(record: Mapping[str, Any]) -> Drawing | None:
         return None
     cases = list(dict.fromkeys(table["case"]))
     figure, panels = lattice(len(cases), 3, row_inch=2.4, more_inch=0.3)
-    for axes, case in zip(panels, cases, strict=True):
+    for axes, case, name in zip(panels, cases, drawn_names(cases), strict=True):
         own = table[table["case"] == case]
         for column, colour, label in (("before_mm", GREY, "as stated"), ("after_mm", SIMULATED, "calibrated")):
             axes.plot(own["frame"], own[column], color=colour, marker="o", markersize=3.5, linewidth=1.0, label=label)
         light = own[own["weight"] < _LIGHT]
         axes.plot(light["frame"], light["after_mm"], "o", markersize=5, markerfacecolor="white", color=SIMULATED)
-        axes.set_title(drawn_name(str(case)), fontsize=9)
+        axes.set_title(name, fontsize=9)
         axes.set_xlabel("frame")
         whole_numbers(axes.xaxis)
         plain(axes)

@@ -13,7 +13,7 @@ from reports.case_files import GOOD
 from reports.colours import BAD, SIMULATED
 from reports.figures._drawing import (
     Drawing,
-    drawn_name,
+    drawn_names,
     error_scale,
     heat_map,
     legend,
@@ -112,7 +112,7 @@ def _tall(names: Sequence[str]) -> tuple[Figure, Axes]:
     figure = new_figure(float(np.clip(1.3 + 0.24 * len(names), 2.2, _MAX_INCH)))
     axes = figure.subplots()
     every = -(-len(names) // _MAX_NAMES)
-    axes.set_yticks(range(0, len(names), every), [*map(drawn_name, names[::every])], fontsize=8)
+    axes.set_yticks(range(0, len(names), every), drawn_names(names)[::every], fontsize=8)
     axes.set_ylim(len(names) - 0.5, -0.5)
     axes.tick_params(axis="x", labeltop=len(names) >= _TOP_TICKS_FROM)
     return figure, axes

@@ -69,17 +69,17 @@ def _calibration(folder: Path) -> Path:
     profile = [[0.5, 8.0], [0.9, 2.0], [1.4, 2.0], [4.0, 9.0]]
     frame = {"case": "a", "before_mm": 0.2, "after_mm": 0.1, "as_given_mm": 0.15, "weight": 1.0}
     frame["turned"] = "in_both"
+    wall = {"insertion": "a", "of": "wall_mm", "how": "to the wall", "value": -0.14, "sd": 0.012, "prior_sd": 0.045}
+    exact = {"insertion": "a", "of": "roll_deg", "how": "turned", "value": 0.0, "sd": 0.0, "prior_sd": 0.0}
     frames = [{"depth_mm": 10.0, "frame": n, **frame} for n in range(4)]
     record = {
         "estimates": estimates,
         "correlation": {"names": ["taper", "wall"], "values": np.eye(2).tolist()},
         "profiles": {"taper": profile, "wall": profile},
         "frames": frames,
-        "insertions": [
-            {"insertion": "a", "of": "wall_mm", "how": "to the wall", "value": -0.14, "sd": 0.012, "prior_sd": 0.045},
-            {"insertion": "a", "of": "roll_deg", "how": "turned", "value": 0.0, "sd": 0.0, "prior_sd": 0.0},
-        ],
+        "insertions": [wall | {"beyond": True}, exact | {"beyond": False}],
         "starts": [[0.5, 57.0]],
+        "reservations": ["what is seen holds only if all else is right"],
         "scale": 1.0,
         "used": [{"case": "a", "group": "a"}],
         "warnings": ["the calibrated wires lie 3.0 times as far from the traces as these are taken to be off"],

@@ -47,4 +47,6 @@ def test_what_each_insertion_was_moved_by_is_told(tmp_path: Path) -> None:
     assert table.count('class="bad"') == 1
     assert "-0.140" in table
     assert "exact" in table
+    assert "that the fit starts from: stated, or taken where nothing is" in table, "of the lumen a run takes 0.05 voxel"
     assert "<code>taper</code>: known to 1.5 only." in text, "a reservation of what is taken"
+    assert text.count("hat is seen holds only if all else is right.") == 1, "it stood beside each that is seen"

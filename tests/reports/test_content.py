@@ -146,18 +146,33 @@ def test_the_ends_of_an_interval_stand_below_what_they_are_of() -> None:
 
 
 def test_a_calibration_that_gains_nothing_says_so() -> None:
-    frames = [{"depth_mm": mm, "before_mm": rms, "after_mm": rms} for mm, rms in ((10.0, 0.05), (30.0, 0.1))]
+    frames = [
+        {"depth_mm": mm, "before_mm": rms, "after_mm": rms, "as_given_mm": 0.3}
+        for mm, rms in ((10.0, 0.05), (30.0, 0.1))
+    ]
     said = gained(frames)
     assert said.startswith("the wires of 2 fitted frames lie 0.0901 mm rms from their traces as stated, 0.0901 mm")
-    both = "; clamps and walls are fitted to both"
+    both = "; clamps and walls are fitted to both; with the walls as they are given it is 0.300 mm"
     assert said.endswith(f"0.0901 mm as calibrated: no nearer{both}")
     assert gained([row | {"after_mm": 0.3} for row in frames]).endswith(f"0.300 mm as calibrated: farther away{both}")
     assert gained([row | {"after_mm": 0.02} for row in frames]).endswith(f"0.0200 mm as calibrated{both}")
-    given = [row | {"as_given_mm": 0.3} for row in frames]
-    assert gained(given).endswith(f"{both}; with the walls as they are given it is 0.300 mm")
     for where, words in (("in_both", ", each insertion turned for itself in both"), ("as_calibrated", " with each")):
         assert f"0.0901 mm as calibrated{words}" in gained([row | {"turned": where} for row in frames])
     assert gained([]) == gained([{"depth_mm": 10.0, "before_mm": None, "after_mm": 0.1}]) == ""
+
+
+def test_what_a_calibration_gains_is_told_of_the_same_frames() -> None:
+    """Of a frame without rest under the given walls only that number was dropped: the worst case read as a gain."""
+    near = {"depth_mm": 10.0, "before_mm": 0.1, "after_mm": 0.05, "as_given_mm": 0.06}
+    wild = {"depth_mm": 10.0, "before_mm": 1.0, "after_mm": 0.5, "as_given_mm": None}
+    said = gained([near, wild, wild])
+    assert said.startswith("the wires of 1 fitted frame lie 0.100 mm rms from their traces as stated, 0.0500 mm")
+    assert said.endswith("it is 0.0600 mm; left out: 2 frames whose wires do not come to rest each time")
+    none = "the walls as they are given none of these wires comes to rest"
+    assert gained([wild]).endswith(none)
+    assert gained([wild, wild | {"before_mm": None}]).endswith(
+        f"{none}; left out: 1 frame whose wires do not come to rest each time"
+    )
 
 
 def test_what_cases_say_with_other_numbers_is_one_line() -> None:

@@ -21,7 +21,7 @@ from reports._content import caption
 from reports.case_files import CaseFiles, read_case
 from reports.colours import ERROR_SCALE_MM, TRACED
 from reports.figures import RunFiles, _drawing, _planes, declared, figures_of
-from reports.figures._drawing import LEAST_MM, Drawing, FrameAxis, positive_axis
+from reports.figures._drawing import LEAST_MM, Drawing, FrameAxis, drawn_names, positive_axis
 from reports.figures._style import STAGE_COLOURS, lines, predictors
 from reports.figures.along_wire import _CLIP_PERCENTILE
 from reports.figures.simulators import SimulatorFiles, _nearest, unbroken, who_is_nearest
@@ -211,6 +211,18 @@ def test_a_table_of_forces_tells_refused_frames_from_others(tmp_path: Path) -> N
     assert list(crosses.get_ydata()) == [2], "the wire of a refused frame was drawn as any other"
 
 
+def test_a_refused_frame_without_a_wire_has_a_cross_in_its_row(tmp_path: Path) -> None:
+    """Its row was blank, as of a frame that nobody refused; a frame beside the rows of the map has no place for one."""
+    case = _heat_case(tmp_path)
+    assert case.samples is not None
+    errors = pd.DataFrame({"frame": [0, 1, 2, 3], "status": ["ok", "no_wire", "ok", "no_wire"]})
+    forces = case.samples.assign(contact_force_N=1.0)
+    drawing = draw(CASE_FIGURES["contact_along_wire"], replace(case, samples=forces, errors=errors))
+    (crosses,) = drawing.figure.axes[0].lines
+    assert list(crosses.get_ydata()) == [1]
+    assert drawing.table[drawing.table["status"] == "no_wire"]["frame"].tolist() == [1]
+
+
 def test_long_names_leave_room_for_what_is_drawn(tmp_path: Path) -> None:
     """Ids of 100 letters left the cells an inch, in which their numbers overlapped, and cut the colour bar's label."""
     names = ["a" * 100, "b" * 99 + "c"]
@@ -227,6 +239,14 @@ def test_long_names_leave_room_for_what_is_drawn(tmp_path: Path) -> None:
     assert bar.yaxis.label.get_window_extent().y0 >= edge.y0
     assert bar.yaxis.label.get_window_extent().y1 <= edge.y1
     assert set(drawing.table["case"]) == set(names), "whole in the table beside it"
+
+
+def test_long_names_that_differ_in_their_middle_are_drawn_with_their_place() -> None:
+    """Two insertions of one phantom on one day were drawn alike."""
+    sides = [f"phantom-03_insertion-from-the-{side}_wire-{n}_2026-01-01T10" for n, side in enumerate(("left", "right"))]
+    short = "phantom-03_insertio\u2026026-01-01T10"
+    assert drawn_names(["a", *sides, "b" * 32]) == ["a", f"2: {short}", f"3: {short}", "b" * 32]
+    assert drawn_names(sides[:1]) == [short]
 
 
 def test_heat_map_shows_each_sample_at_its_place(tmp_path: Path) -> None:
