@@ -138,6 +138,14 @@ def test_scans_of_one_depth_are_one_reading_of_it(count: int) -> None:
     assert len(elsewhere([*(stated - 1.5)], [*stated])) == 1
 
 
+@pytest.mark.parametrize("apart", [4e-15, 3e-8, 1e-7, 1e-3])
+def test_depths_that_rounding_tells_apart_are_one(apart: float) -> None:
+    """A parabola through them ended the case with a singular matrix, or grew 27,000 times as fast."""
+    stated = [20.0, 20.0 + apart, 40.0, 40.0 + apart]
+    seen = frames([21.2, 21.21, 42.4, 42.43], stated)
+    assert not on_another_scale(seen, from_entry(seen))
+
+
 def test_a_wrong_scale_is_no_wrong_zero_too() -> None:
     """Of depths from 60 to 150 mm and 1.01 for 1 both were told: one error, and two causes."""
     stated = np.linspace(60.0, 150.0, 10)
