@@ -14,8 +14,8 @@ def unscored(cases: Iterable[tuple[str, str]]) -> str:
     learnt = [role == "calibration" for role, _ in known]
     if known and all(learnt):
         return (
-            'Nothing is scored: every case has role = "calibration", and frames that parameters are learnt from say '
-            'nothing about the simulator; add insertions of role = "validation". wireval calibrate learns from these.'
+            'Nothing is scored: wireval calibrate learns from every case (role = "calibration", or taken for its '
+            'parameters), and such frames say nothing about the simulator; add insertions of role = "validation".'
         )
     if known and all(own or status == "simulated" for own, (_, status) in zip(learnt, known, strict=True)):
         return "Nothing is scored: no case has scans, traces or projections of a real wire to be compared with."

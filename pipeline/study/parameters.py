@@ -154,7 +154,7 @@ def with_parameters(case: "Case", found: Parameters, data: Sequence[str], *, sco
     changes: dict[str, Any] = {
         "wire": replace(case.wire, **profiles),
         "wall": replace(case.wall, stiffness_N_mm2=stiffness, friction=friction),
-        "calibrated": _told(case, found, known_wall=wall is not None),
+        "calibrated": _told(case, found, wall),
         "calibrated_sigma": _sigmas(case, found),
         "calibrated_scans": () if score_used else tuple(scan for used in found.used for scan in used.data),
         "calibrated_traces": () if score_used else tuple(trace for used in found.used for trace in used.traced_mm),
@@ -194,12 +194,14 @@ def _sigmas(case: "Case", found: Parameters) -> dict[str, float]:
     return {keys[one.name]: one.sd for one in found.estimate if one.seen and one.name in keys}
 
 
-def _told(case: "Case", found: Parameters, *, known_wall: bool) -> str:
-    """For the report: what is calibrated, and what stays as stated."""
-    parts = [f"calibrated with {', '.join(u.case for u in found.used)}: {', '.join(found.seen) or 'nothing'}"]
+def _told(case: "Case", found: Parameters, wall: WallFound | None) -> str:
+    """For the report: what is calibrated, and what stays as stated. wall : the calibrated one of the case."""
+    own = "" if wall is None else f"wall:{wall.stated_N_mm2:g}"
+    seen = [name for name in found.seen if not name.startswith("wall:") or name == own]
+    parts = [f"calibrated with {', '.join(u.case for u in found.used)}: {', '.join(seen) or 'nothing'}"]
     if found.unseen:
         parts.append(f"not seen there, as stated: {', '.join(found.unseen)}")
-    if not known_wall:
+    if wall is None:
         parts.append(f"no wall stated at {case.wall.stiffness_N_mm2:g} N/mm2 was calibrated: as stated")
     if not found.absolute_stiffness:
         parts.append("stiffness is known in its ratios alone: forces are in units of the stated one")

@@ -695,6 +695,7 @@ def test_the_budget_is_told_how_well_what_was_seen_is_known(study):
     assert case.calibrated_sigma == {"rest_curvature": 0.01, "wall_stiffness": 0.1}, (
         "its own wall; nothing of the taper"
     )
+    assert "rest_curvature, wall:7;" in case.calibrated, "another's wall is none of its own"
 
 
 @pytest.mark.parametrize("stated", ["7.000000001", "7.0001", "6.9999"])

@@ -8,6 +8,7 @@ import struct
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -247,14 +248,18 @@ def test_an_hdf5_sequence_is_one_header_a_volume(tmp_path: Path) -> None:
     np.testing.assert_array_equal(second.values, (numbered() + 1)[:, 1:3, 2:4])
 
 
+@pytest.mark.parametrize("kind", [str, np.bytes_, lambda axes: np.array([axes.encode()])])
 @pytest.mark.parametrize("axes", ["x,y,z", "z,y,x"])
-def test_an_hdf5_group_of_volumes_is_a_sequence_with_either_axis_order(tmp_path: Path, axes: str) -> None:
+def test_an_hdf5_group_of_volumes_is_a_sequence_with_either_axis_order(
+    tmp_path: Path, axes: str, kind: Callable[[str], Any]
+) -> None:
+    """C and MATLAB write a text as bytes, or as an array of one: these were refused."""
     path = tmp_path / "study.h5"
     with h5py.File(path, "w") as file:
         for i in range(3):
             values = numbered() + i
             data = file.create_dataset(f"frames/{i:03d}", data=values if axes == "x,y,z" else values.T)
-            data.attrs.update(spacing_mm=SPACING, origin_mm=ORIGIN, direction=TURN, axes=axes)
+            data.attrs.update(spacing_mm=SPACING, origin_mm=ORIGIN, direction=TURN, axes=kind(axes))
     header = read_header(Source(path, "/frames"))
     assert (header.item_count, header.shape) == (3, (5, 7, 9))
     last = load(list(each_volume(header))[2], ((0, 1, 2), (5, 3, 4)))

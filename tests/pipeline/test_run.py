@@ -503,8 +503,9 @@ def test_a_run_of_calibration_cases_says_that_nothing_is_scored(out: Path, capsy
     path.write_text(json.dumps(result), encoding="utf-8")
     ledger.write(path.parent, "key")
     assert main(["report", str(out), "--overview"]) == 0
-    assert 'Nothing is scored: every case has role = "calibration"' in capsys.readouterr().out
-    assert "Nothing is scored: every case has role" in (out / "index.html").read_text(encoding="utf-8")
+    said = "Nothing is scored: wireval calibrate learns from every case"
+    assert f'{said} (role = "calibration"' in capsys.readouterr().out
+    assert said in (out / "index.html").read_text(encoding="utf-8")
 
 
 def test_diff_is_a_gate(finished: Path, tmp_path: Path) -> None:
