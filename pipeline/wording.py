@@ -153,7 +153,8 @@ def _no_such_key(schema: Schema, place: Place, found: Any) -> str:
         return f": unknown key; {did_you_mean(key, own)}"
     if here == SIGMAS and isinstance(found, (int, float)) and "_sigma_" not in key:
         sigma = _sigma_of(key, _keys(schema, place[:-2]))
-        known = sigma and f"how well it is known is {sigma} of [[case]]: write that above [{here}]"
+        both = f"{key} is a key of [[case]], and how well it is known is {sigma}"
+        known = sigma and f"{both}: write the one that is meant above [{here}]"
         return f": unknown key; {known or 'allowed: ' + ', '.join(sorted(own))}"
     if isinstance(found, dict):
         where = f"write {' or '.join(f'[{name}.{key}]' for name in homes)}"

@@ -193,11 +193,9 @@ def gained(frames: Sequence[Mapping[str, Any]]) -> str:
     Rolls that are stated 40 degrees off were "as stated" 0.06 mm, which a run as stated is not: it turns no insertion.
     """
     every = pd.DataFrame(frames, columns=["depth_mm", *STATED_AND_FITTED, AS_GIVEN]).astype(float)
-    rest = every.dropna(subset=STATED_AND_FITTED)
-    if rest.empty:
+    known = every.dropna(subset=["depth_mm", *STATED_AND_FITTED])
+    if known.empty:
         return ""
-    # of the same frames, since those that come to rest in one of the three alone are the worst of the others
-    known = rest.dropna() if rest[AS_GIVEN].notna().any() else rest
     before, after = (_rms_mm(known, name) for name in STATED_AND_FITTED)
     said = "" if after < GAINED * before else ": no nearer" if after < before / GAINED else ": farther away"
     turned = {str(frame.get("turned", "")) for frame in frames}
@@ -205,20 +203,23 @@ def gained(frames: Sequence[Mapping[str, Any]]) -> str:
     return (
         f"the wires of {counted(len(known), 'fitted frame')} lie {number(before)} mm rms from their traces as stated, "
         f"{number(after)} mm as calibrated{alone}{said}; clamps and walls are fitted to both"
-        f"{_as_given(known)}{_lost(len(every) - len(known))}"
+        f"{_as_given(known)}"
     )
 
 
 def _as_given(known: pd.DataFrame) -> str:
-    """What is said of the wires with the walls as they are given."""
-    if known[AS_GIVEN].isna().any():
+    """What is said of the wires with the walls as they are given: of fewer frames, how near these came besides.
+
+    Those that do not come to rest there may be the worst: without them alone the worst case read as a gain.
+    """
+    given = known.dropna(subset=[AS_GIVEN])
+    if given.empty:
         return "; with the walls as they are given none of these wires comes to rest"
-    return f"; with the walls as they are given it is {number(_rms_mm(known, AS_GIVEN))} mm"
-
-
-def _lost(frames: int) -> str:
-    """What is said of frames that have not all of these distances."""
-    return f"; left out: {counted(frames, 'frame')} whose wires do not come to rest each time" * bool(frames)
+    said = f"; with the walls as they are given it is {number(_rms_mm(given, AS_GIVEN))} mm"
+    if len(given) == len(known):
+        return said
+    calibrated = number(_rms_mm(given, "after_mm"))
+    return f"{said} over the {counted(len(given), 'frame')} that come to rest then, {calibrated} mm as calibrated"
 
 
 def _rms_mm(frames: pd.DataFrame, name: str) -> float:

@@ -3,6 +3,7 @@
 Of a lumen 10 % too narrow all walls are moved away by as much: the wires meet the traces, and no run has these walls.
 """
 
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
@@ -15,6 +16,8 @@ from pipeline.calibrate.trials import OWN
 
 BEYOND = 3.0
 """Least prior standard deviations beyond which a number is told: a right statement is so in one of 370 cases."""
+EACH = 2.0
+"""The same of each of the numbers on which all insertions agree, which are beyond 3 on average."""
 RIGHT_TOLD = 0.01
 """Most of right studies of which some number is told by itself: beyond 3 each it was up to 9 % with 5 insertions."""
 ENTRY, DIRECTION, WALL, ROLL = "entry_mm", "entry_direction", "wall_mm", "roll_deg"
@@ -66,12 +69,16 @@ def limit_of(numbers: int) -> float:
 def moved_of(fit: Fit) -> list[Moved]:
     """All numbers of every insertion; without the roll where none is stated.
 
-    What all insertions have beyond 3 to one side no chance explains, however many numbers there are: walls of a lumen
-    10 % too narrow are at 3.1.
+    What all insertions have to one side, beyond 3 on average, is told however many numbers there are: walls of a lumen
+    10 % too narrow are at 3.1. Of what they share, as the lumen, chance puts it there in one study of 370.
     """
     every, insertions = _numbers(fit), len(fit.problem.insertions)
-    limit, far = limit_of(sum(one.prior_sd > 0.0 for one in every)), [one.alike for one in every if one.farther(BEYOND)]
-    agreed = {alike for alike in far if far.count(alike) == insertions > 1}
+    limit = limit_of(sum(one.prior_sd > 0.0 for one in every))
+    times = defaultdict[tuple[str, str, bool], list[float]](list)
+    for one in every:
+        if one.farther(EACH):
+            times[one.alike].append(abs(one.value) / one.prior_sd)
+    agreed = {alike for alike, far in times.items() if len(far) == insertions > 1 and np.mean(far) > BEYOND}
     return [replace(one, beyond=one.farther(limit) or one.alike in agreed) for one in every]
 
 

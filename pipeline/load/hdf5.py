@@ -93,7 +93,8 @@ def _attribute(source: Source, data: h5py.Dataset, name: str, default: Any, allo
 def _is_xyz(data: h5py.Dataset, source: Source) -> bool:
     allowed = " or ".join(map(repr, AXES))
     found = np.ravel(_attribute(source, data, "axes", AXES[0], allowed))
-    axes = str(found.astype(str)[0] if len(found) == 1 else found)  # C and MATLAB write bytes, or an array of one
+    one = found[0] if len(found) == 1 else found  # C and MATLAB write bytes, padded, or an array of one
+    axes = (one.decode("utf-8", "replace") if isinstance(one, bytes) else str(one)).strip()
     if axes not in AXES:
         raise unusable(source, f"attribute axes is {axes!r}; allowed: {allowed}")
     return axes == AXES[1]

@@ -197,10 +197,12 @@ def _sigmas(case: "Case", found: Parameters) -> dict[str, float]:
 def _told(case: "Case", found: Parameters, wall: WallFound | None) -> str:
     """For the report: what is calibrated, and what stays as stated. wall : the calibrated one of the case."""
     own = "" if wall is None else f"wall:{wall.stated_N_mm2:g}"
-    seen = [name for name in found.seen if not name.startswith("wall:") or name == own]
+    seen, unseen = (
+        [name for name in names if not name.startswith("wall:") or name == own] for names in (found.seen, found.unseen)
+    )
     parts = [f"calibrated with {', '.join(u.case for u in found.used)}: {', '.join(seen) or 'nothing'}"]
-    if found.unseen:
-        parts.append(f"not seen there, as stated: {', '.join(found.unseen)}")
+    if unseen:
+        parts.append(f"not seen there, as stated: {', '.join(unseen)}")
     if wall is None:
         parts.append(f"no wall stated at {case.wall.stiffness_N_mm2:g} N/mm2 was calibrated: as stated")
     if not found.absolute_stiffness:

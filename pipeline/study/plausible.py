@@ -55,7 +55,7 @@ def entry_in_metres(case: Case, header: Header | None) -> list[str]:
     in_mm = 1e3 * np.asarray(case.entry_mm)
     if not least <= float(np.abs(case.entry_mm).max()) < most:
         return []
-    if header is not None and np.any(header.grid.beyond_mm(in_mm) > 0.0):  # in mm it would lie in no scan
+    if header is not None and np.any(header.grid.beyond_mm(in_mm) > max(header.grid.spacing_mm)):  # it lies in no scan
         return []
     told = ", ".join(f"{value:g}" for value in in_mm)
     return [f"entry_mm lies within {most:g} mm of 0, 0, 0: is it in metres ([{told}] mm)?"]

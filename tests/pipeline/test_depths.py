@@ -139,10 +139,11 @@ def test_scans_of_one_depth_are_one_reading_of_it(count: int) -> None:
 
 
 @pytest.mark.parametrize("apart", [4e-15, 3e-8, 1e-7, 1e-3])
-def test_depths_that_rounding_tells_apart_are_one(apart: float) -> None:
+@pytest.mark.parametrize("depth", [20.0, 20.125])
+def test_depths_that_rounding_tells_apart_are_one(depth: float, apart: float) -> None:
     """A parabola through them ended the case with a singular matrix, or grew 27,000 times as fast."""
-    stated = [20.0, 20.0 + apart, 40.0, 40.0 + apart]
-    seen = frames([21.2, 21.21, 42.4, 42.43], stated)
+    stated = [depth, depth + apart, 2.0 * depth, 2.0 * depth + apart]
+    seen = frames([1.06 * depth, 1.06 * depth + 0.01, 2.12 * depth, 2.12 * depth + 0.03], stated)
     assert not on_another_scale(seen, from_entry(seen))
 
 

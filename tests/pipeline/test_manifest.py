@@ -240,9 +240,15 @@ def test_a_key_of_another_table_is_told_with_that_table(tmp_path: Path, text: st
 @pytest.mark.parametrize(
     ("line", "told"),
     [
-        ("roll_deg = 5", "how well it is known is roll_sigma_deg of [[case]]: write that above [case.uncertainty]"),
-        ("insertion_mm = 0.5", "how well it is known is insertion_sigma_mm of [[case]]: write that above [case."),
-        ("entry_direction = 2", "how well it is known is entry_direction_sigma_deg of [[case]]: write that above"),
+        ("roll_deg = 5", "roll_deg is a key of [[case]], and how well it is known is roll_sigma_deg: write the one"),
+        (
+            "insertion_mm = 0.5",
+            "insertion_mm is a key of [[case]], and how well it is known is insertion_sigma_mm: write the one",
+        ),
+        (
+            "entry_direction = 2",
+            "entry_direction is a key of [[case]], and how well it is known is entry_direction_sigma_deg",
+        ),
         ("entry_sigma_mm = 0.2", "it is a key of [[case]]: write it above [case.uncertainty]"),
         ("push_force_N = [1, 2]", "it is a key of [[case]]: write it above [case.uncertainty]"),
         ("lumen = 0.1", "did you mean 'lumen_mm'?"),

@@ -45,8 +45,8 @@ WIDE_MM = 2.5
 all alike, it is near -1 in 4 to 9 % over 0.5 mm, in 0.2 % over this."""
 OUTSIDE = "are these the lengths left outside (insertion_mm is beyond entry_mm), or are frames in opposite order?"
 TURNED = "or entry_direction points back along the wire: turn it round"
-READ_DIGITS = 2
-"""Digits behind the point, of mm, to which a depth is read."""
+APART_MM = 0.01
+"""Distance of two depths that are two readings."""
 LEAST_MM, OF_MEDIAN = 0.5, 1.25
 """By how much the zero of depths must be off to be told, and a median's standard deviation over a mean's."""
 
@@ -94,11 +94,12 @@ def by_stated_depth(frames: Sequence[Frame], depths_mm: Mapping[int, float]) -> 
 
     depths_mm : of ``traced_depths``.
     """
-    seen = [f for f in frames if f.index in depths_mm]
+    seen = sorted((f for f in frames if f.index in depths_mm), key=lambda f: f.expected_mm)
+    read, traced = np.array([f.expected_mm for f in seen]), np.array([depths_mm[f.index] for f in seen])
     # depths that rounding tells apart are one: no line and no parabola goes through them
-    stated, of = np.unique(np.round([f.expected_mm for f in seen], READ_DIGITS), return_inverse=True)
-    traced = np.array([depths_mm[f.index] for f in seen])
-    return stated, np.array([np.median(traced[of == n]) for n in range(len(stated))])
+    of = np.cumsum(np.diff(read, prepend=read[:1]) > APART_MM)
+    each = [of == n for n in np.unique(of)]
+    return np.array([np.median(read[one]) for one in each]), np.array([np.median(traced[one]) for one in each])
 
 
 def to_depth(frames: Sequence[Frame], depths_mm: Mapping[int, float], tolerance_mm: float) -> list[Frame]:
