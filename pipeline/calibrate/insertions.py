@@ -56,9 +56,10 @@ class Moved:
         """What insertions agree on: what was moved, how, and to which side."""
         return self.of, self.how, self.value > 0.0
 
-    def farther(self, times: float) -> bool:
-        """Whether it is farther from what is stated than so many of its prior's standard deviations."""
-        return abs(self.value) > times * self.prior_sd > 0.0
+    @property
+    def times(self) -> float:
+        """How far it is from what is stated, in standard deviations of its prior; 0 where it is stated as exact."""
+        return abs(self.value) / self.prior_sd if self.prior_sd > 0.0 else 0.0
 
 
 def limit_of(numbers: int) -> float:
@@ -76,10 +77,10 @@ def moved_of(fit: Fit) -> list[Moved]:
     limit = limit_of(sum(one.prior_sd > 0.0 for one in every))
     times = defaultdict[tuple[str, str, bool], list[float]](list)
     for one in every:
-        if one.farther(EACH):
-            times[one.alike].append(abs(one.value) / one.prior_sd)
+        if one.times > EACH:
+            times[one.alike].append(one.times)
     agreed = {alike for alike, far in times.items() if len(far) == insertions > 1 and np.mean(far) > BEYOND}
-    return [replace(one, beyond=one.farther(limit) or one.alike in agreed) for one in every]
+    return [replace(one, beyond=one.times > limit or one.alike in agreed) for one in every]
 
 
 def _numbers(fit: Fit) -> list[Moved]:
