@@ -88,8 +88,8 @@ def write_view(
         export.write_collection(folder, f"wire_{kind}")
     with_wire = [frame.index for frame in known.frames if frame.simulated is not None]
     shown = max(with_wire, default=0)
-    not_ok = {frame.index: frame.status for frame in known.frames if not frame.ok}
-    export.write_scene(folder, shown, *_scans_of(known, shown), not_ok)
+    statuses = {frame.index: frame.status for frame in known.frames}
+    export.write_scene(folder, shown, *_scans_of(known, shown), statuses)
 
 
 _SLICER = (".mha", ".mhd", ".nrrd", ".nhdr", ".nii", ".nii.gz")

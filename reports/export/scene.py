@@ -45,14 +45,14 @@ def write_scene(
     shown: int,
     scans: Mapping[str, Path] | None = None,
     said: str = "",
-    not_ok: Mapping[int, str] = MappingProxyType({}),
+    statuses: Mapping[int, str] = MappingProxyType({}),
 ) -> Path | None:
     """Write scene.mrml over the files of ``folder``, frame ``shown`` switched on; None where there is none of them.
 
     scans : by name, which 3D Slicer reads as they are.     said : what a reader of the scene should know of them.
-    not_ok : statuses of the frames that are not.
+    statuses : of the frames, for their wires' names; ok where it is not given.
     """
-    things = list(_things(folder, shown, not_ok))
+    things = list(_things(folder, shown, statuses))
     if not things:
         return None
     root = ET.Element("MRML", version="Slicer5.0.0", userTags="")
@@ -77,7 +77,7 @@ def write_scene(
     return path
 
 
-def _things(folder: Path, shown: int, not_ok: Mapping[int, str]) -> Iterator[_Thing]:
+def _things(folder: Path, shown: int, statuses: Mapping[int, str]) -> Iterator[_Thing]:
     files = sorted(path.name for path in folder.glob("[!.]*"))
     if "lumen.vtp" in files:
         glass = {"color": _triple(colours.LUMEN), "opacity": "0.3", "visibility": "true", "backfaceCulling": "false"}
@@ -89,7 +89,7 @@ def _things(folder: Path, shown: int, not_ok: Mapping[int, str]) -> Iterator[_Th
         if found := _WIRE.fullmatch(file):
             kind, frame, ending = found.groups()
             seen = "true" if int(frame) == shown and ending == "vtp" else "false"
-            name = wire_name(kind, int(frame), not_ok.get(int(frame), "ok"))
+            name = wire_name(kind, int(frame), statuses.get(int(frame), "ok"))
             look = {"color": _triple(colours.WIRES[kind]), "visibility": seen}
             if ending == "vtp":
                 yield _Thing("Model", "ModelStorage", name, file, look | {"lineWidth": "4"})

@@ -228,7 +228,7 @@ def test_the_scene_opens_everything_with_names_and_colours(tmp_path: Path) -> No
 
 def test_wires_of_frames_that_are_not_ok_are_called_so(tmp_path: Path) -> None:
     """They stood among the others, in the same colours and with plain names."""
-    path = export.write_scene(_view(tmp_path), shown=2, not_ok={2: "trace_low_contrast"})
+    path = export.write_scene(_view(tmp_path), shown=2, statuses={2: "trace_low_contrast"})
     assert path is not None
     names = {node.get("name") for node in ET.parse(path).getroot()}
     assert names >= {"traced 000", "traced 002 (frame not ok: trace_low_contrast)", "traced 010, curve"}
