@@ -83,10 +83,11 @@ def sentences_of(
     texts = [f"frame {n}: {r.sentence}" for n, r in known if r.applied and not r.doubt]
     if still:
         most, where = max(still)
+        shown = " as far as its wall shows" * alignment.anchor.hides
         texts.insert(
             0,
             f"no registration applied to {len(still)} of {len(found)} frames: the phantom moved {most:.2f} voxel at "
-            f"most (frame {where}), below trace.register_skip_voxels = {alignment.skip_voxels}",
+            f"most{shown} (frame {where}), below trace.register_skip_voxels = {alignment.skip_voxels}",
         )
     if alignment.anchor.hides and known:
         texts.append(HIDES)

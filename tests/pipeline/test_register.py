@@ -310,6 +310,7 @@ def test_frames_of_a_straight_tube_that_rest_share_one_sentence() -> None:
     assert not found.applied
     texts, warnings = sentences_of(Alignment(to, 0.04), {3: found, 4: Registration()})
     assert "to 2 of 2 frames" in texts[0]
+    assert "voxel at most as far as its wall shows (frame 3)" in texts[0]
     assert (texts[1:], warnings) == ([HIDES], [])
 
 
