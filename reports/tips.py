@@ -26,10 +26,11 @@ def tips_off(statistics: Mapping[str, Any]) -> str:
             return f"{100 * (1 - covered):.0f} % of the traced wires have no simulated one near: {unseen}"
         back = value_of(statistics.get("back_rms_mm"))
         farther = (
-            f"The traced wires lie {number(back)} mm from the simulated ones, which in some frames end early: {unseen}"
+            f"The traced wires lie {number(back)} mm from the simulated ones, which in some frames do not reach all of "
+            f"them: {unseen}"
         )
         return farther if back > max(BACK_MM, BACK_RATIO * rms) else ""
     if along > 0.5 * tip:  # what lies beyond the trace counts with its distance from the trace's end
-        return f"The wire ends {number(along)} mm beyond (median): judge by tip_median_mm."
-    where = f"ends {number(-along)} mm short" if -along > 0.5 * tip else f"has its tip {number(tip)} mm off"
-    return f"The wire {where} (median): {unseen}"
+        return f"The wire's tip lies {number(along)} mm farther along the vessel (median): judge by tip_median_mm."
+    where = f"{number(-along)} mm short along the vessel" if -along > 0.5 * tip else f"{number(tip)} mm off"
+    return f"The wire's tip lies {where} (median): {unseen}"

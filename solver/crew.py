@@ -119,10 +119,10 @@ def _solutions(plan: Plan, w: int, work: Workspace) -> list[Solution]:
     noted = zip(*(getattr(plan, name)[w, : plan.count[w]].tolist() for name in names), strict=True)
     found = []
     for n, (*notes, (outcome, iterations, k), row) in enumerate(noted):
-        # copies: the next wire's results overwrite these
+        # none is a view: the next wire's results overwrite these
         depth, roll, *_ = notes[0]
         x, r, force = (a[w, row : row + k + 1] for a in (plan.x, plan.r, plan.force))
-        arrays = [x.copy(), work.rolled(r, roll), force.copy()]
+        arrays = [x + work.middle_mm, work.rolled(r, roll), force.copy()]
         ended = Status[data.OUTCOMES[outcome]], iterations, depth, roll, work.wire.radius_mm
         found.append(Solution.assembled(arrays, tuple(notes), plan.snaps[w, n], ended))
         if work.at_entry is not None:

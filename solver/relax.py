@@ -139,7 +139,7 @@ def relax(
     work.load((0.0, 0.0, 0.0) if load_N is None else load_N)
     work.clamp(entry, base_frame(direction, material_axis, roll_deg), weight=weight_of("relax", wire, down))
     chain, state = work.problem.chain, work.problem.state
-    follow(curve, len(curve), chain, state.u[CURRENT], state.x[CURRENT], state.r[CURRENT], (0, work.k))
+    follow(curve - work.middle_mm, len(curve), chain, state.u[CURRENT], state.x[CURRENT], state.r[CURRENT], (0, work.k))
     return _judged(_allowed(work.solution(*work.advance(depth_mm, 0.0, work.k), depth_mm, roll_deg), wall, entry))
 
 

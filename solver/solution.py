@@ -85,8 +85,9 @@ class Solution:
     push_force_N : the axial force of the hand, dU/d(depth). In lumens with less room for the wire than about a voxel it
     is wrong, even of the wrong sign, with segments whose shapes are right; compare it with that of segments of
     0.0625 mm.
-    max_penetration_mm : deepest overlap of the wire's hull with the wall. Above the wire's radius its axis lies in the
-    wall: the distance, its unit or the wall's stiffness is wrong, and push_force_N is none of a vessel.
+    max_penetration_mm : deepest overlap of the wire's hull with the wall, of the places in which its forces are summed.
+    Above the wire's radius its axis lies in the wall: the distance, its unit or the wall's stiffness is wrong, and
+    push_force_N is none of a vessel.
     counts : in the order of ``_kernels.records.COUNTERS``; ``work`` has them by name.
     start_energy_N_mm : the total energy at the start of the last relaxation.
     least_pivot : how far the wire is from giving way, the least value over all joints. A joint's value is the stiffness

@@ -21,7 +21,8 @@ STIFFNESS_N_MM2 = Range(1e-9, 1e9, "0.1 to 100 is usual")
 OFFSET_MM = Range(-FAR_MM, FAR_MM, "a tenth of a voxel is usual")
 MAKE_A_DISTANCE = (
     "a mask of the lumen is made one by scipy.ndimage: gaussian_filter("
-    "distance_transform_edt(~mask, spacing_mm) - distance_transform_edt(mask, spacing_mm), 1)"
+    "distance_transform_edt(~mask, spacing_mm) - distance_transform_edt(mask, spacing_mm), "
+    "[min(spacing_mm) / mm for mm in spacing_mm])"
 )
 SLICES = 16
 FLAT, STEEP = 0.5, 1.75
@@ -29,6 +30,9 @@ FLAT, STEEP = 0.5, 1.75
 radius has 1.0, one with noise of half a voxel 1.6."""
 NO_LUMEN = 1e-6
 """Of a voxel: what rounding leaves of a distance of 0."""
+BAND_MM, CUT_SHARE = 1.0, 0.25
+"""A distance that goes no farther outside, and is the same there in this share of the voxels, is cut off, as a narrow
+band is: an axis that is pressed beyond it meets no wall. Cut off at 0.5 mm, stiff wires lay 9 mm outside, at rest."""
 
 
 def _is_mask(values: Array, least: float, largest: float) -> bool:
@@ -96,11 +100,23 @@ def _doubts(values: Array, spacing_mm: Array) -> str:
             f"{MAKE_A_DISTANCE}; of a distance to a centreline subtract the vessel's radius"
         )
     if FLAT <= steep <= STEEP or np.isnan(steep):
-        return ""
+        return _cut_off(values)
     return (
         f"it changes by {steep:.2g} per mm across the wall, a signed distance in mm by 1; is it in voxels or in "
         "metres, or a difference of two distance transforms that was not smoothed (gaussian_filter(..., 1)), is the "
         "spacing right, are the axes x, y, z?"
+    )
+
+
+def _cut_off(values: Array) -> str:
+    """That distances (nx, ny, nz) end where a wire may yet be pressed to; empty where they do not."""
+    most = float(values.max())
+    few = min(values.shape) <= 3 or np.count_nonzero(values == most) < CUT_SHARE * values.size
+    if few or not 0.0 < most < BAND_MM:
+        return ""
+    return (
+        f"it is cut off at {most:.2g} mm outside the lumen: a wire that is pressed so deep meets no wall, and comes to "
+        f"rest far outside; give the distance up to {BAND_MM:g} mm and more"
     )
 
 
@@ -134,7 +150,8 @@ class VesselWall:
     radius). "samples:N" takes the mean over N points around each joint. With the same k, a wall is softer with samples,
     and the more so the less deep the wire is pressed in, since few of the N points are then in the wall.
     Beyond the grid the distance continues linearly. Raises ValueError for NaN or inf in the grid; warns if no value is
-    negative, or if the slope at the wall shows that the values are no distances in mm; ``doubts`` says so, too.
+    negative, if the slope at the wall shows that the values are no distances in mm, or if these are cut off right
+    beyond the wall; ``doubts`` says so, too.
     """
 
     distance: Grid
@@ -142,6 +159,7 @@ class VesselWall:
     friction: float = 0.0
     hull: str = "offset"
     doubts: str = field(init=False)
+    middle_mm: Array = field(init=False)
     field: Field = field(init=False)
 
     def __post_init__(self) -> None:
@@ -157,7 +175,10 @@ class VesselWall:
         to_index = np.ascontiguousarray((self.distance.direction / self.distance.spacing_mm).T)
         coefficients = _padded(values)
         gap, slope = _bounds(coefficients, to_index)
-        origin, spacing = np.array(self.distance.origin_mm), self.distance.voxel_mm
+        # kernels count from the grid's middle: 1 m from the scanner's origin, rounding doubled the wires in doubt
+        middle = np.round(self.distance.to_mm(0.5 * np.array(values.shape)))
+        object.__setattr__(self, "middle_mm", read_only(middle))
+        origin, spacing = np.array(self.distance.origin_mm) - middle, self.distance.voxel_mm
         object.__setattr__(self, "field", Field(coefficients, to_index, origin, gap, slope, spacing, marks))
 
     def __repr__(self) -> str:
@@ -220,7 +241,6 @@ class VesselWall:
         if points.ndim != 2:
             refuse("wall", "points_mm", points.shape, "points (n, 3)", "reshape them")
         jets = np.zeros((len(points), 10))
-        # of points that cannot be written to, as a solution's joints are, it would be compiled once more: seconds
-        look_up(self.field, np.require(points, requirements=["C", "W"]), jets)
+        look_up(self.field, np.ascontiguousarray(points - self.middle_mm), jets)
         order = [[4, 7, 8], [7, 5, 9], [8, 9, 6]]
         return jets[:, 0], jets[:, 1:4], jets[:, order]

@@ -49,7 +49,7 @@ def _called(name: str, profile: Callable[[Array], ArrayLike], at: Array) -> Arra
     """The values of a callable at distances (n,); one that takes a distance at a time, as with ``if``, is refused."""
     try:
         return profile(at)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, LookupError, ArithmeticError) as error:
         allowed = "a function that takes an array of distances"
         refuse("wire", name, Found(f"a function that fails with one: {error}"), allowed, "for an if, numpy.where")
 

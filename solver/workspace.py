@@ -103,6 +103,11 @@ class Workspace:
         self.report = np.zeros(3, records.REPORT)
         self._grow(16)
 
+    @property
+    def middle_mm(self) -> Array:
+        """(3,) LPS mm, from which kernels count places."""
+        return self.wall.middle_mm if self.wall is not None else np.zeros(3)
+
     def _grow(self, capacity: int) -> None:
         """Make room for more segments, keeping the wire that lies there."""
         points = len(self.rule.hull) * (2 * capacity + len(self.rule.tip_at))
@@ -178,7 +183,7 @@ class Workspace:
         """
         step, turn, finest = map(float, steps)
         self.introducer = Introducer(
-            entry=entry,
+            entry=entry - self.middle_mm,
             frame=np.ascontiguousarray(frame),
             load=np.array(tip_load, dtype=np.float64),
             translate=translate,
@@ -190,7 +195,7 @@ class Workspace:
             weight=np.array(weight, dtype=np.float64),
             finest=min(finest / step, 1.0),
         )
-        self.problem.state.x[:, 0], self.problem.state.r[:, 0] = entry, frame
+        self.problem.state.x[:, 0], self.problem.state.r[:, 0] = self.introducer.entry, frame
         if self.wall is not None:
             self.at_entry = EntryContact(self.wall, self.rule, self.wire.radius_mm, entry, frame)
             self.problem = self.problem._replace(pressed=self.at_entry.energy)
@@ -269,7 +274,7 @@ class Workspace:
         """The wire as it lies now."""
         n, state = self.k + 1, self.problem.state
         arrays = [
-            state.x[CURRENT, :n].copy(),
+            state.x[CURRENT, :n] + self.middle_mm,
             self.rolled(state.r[CURRENT, :n], float(self.place["roll"][0])),
             self.force[:n].copy(),
         ]

@@ -104,12 +104,14 @@ def points_in_table(path: Path, rows: list[list[str]]) -> NDArray[np.float64]:
         raise refused(path, got, "as many", "write decimals with a point, and values separated by commas")
     if columns is None and len(head) != 3:
         raise unusable(path, f"has {len(head)} columns without names; expected x, y, z; name them above the table")
+    taken, below = (range(3), rows) if columns is None else (columns, rows[1:])
+    allowed = "columns x_mm, y_mm, z_mm of numbers"
+    short = next((row for row in below if len(row) <= max(taken)), None)
+    if short is not None:
+        raise refused(path, f"a row of {len(short)} values, {', '.join(short)}", allowed, "write three in every row")
     try:
-        if columns is None:
-            return np.array([[to_number(r[c]) for c in range(3)] for r in rows]).reshape(-1, 3)
-        return np.array([[to_number(r[c]) for c in columns] for r in rows[1:]]).reshape(-1, 3)
-    except (ValueError, IndexError) as error:
-        allowed = "columns x_mm, y_mm, z_mm of numbers"
+        return np.array([[to_number(row[c]) for c in taken] for row in below]).reshape(-1, 3)
+    except ValueError as error:
         raise refused(path, f"{error} (header {head})", allowed, "name the columns") from error
 
 

@@ -92,12 +92,17 @@ def _attribute(source: Source, data: h5py.Dataset, name: str, default: Any, allo
 
 def _is_xyz(data: h5py.Dataset, source: Source) -> bool:
     allowed = " or ".join(map(repr, AXES))
-    found = np.ravel(_attribute(source, data, "axes", AXES[0], allowed))
-    one = found[0] if len(found) == 1 else found  # C and MATLAB write bytes, padded, or an array of one
-    axes = (one.decode("utf-8", "replace") if isinstance(one, bytes) else str(one)).strip()
+    axes = text_of(_attribute(source, data, "axes", AXES[0], allowed))
     if axes not in AXES:
         raise unusable(source, f"attribute axes is {axes!r}; allowed: {allowed}")
     return axes == AXES[1]
+
+
+def text_of(attribute: Any) -> str:
+    """An attribute's text: C and MATLAB write bytes, padded, or an array of one."""
+    found = np.ravel(attribute)
+    one = found[0] if len(found) == 1 else found
+    return (one.decode("utf-8", "replace") if isinstance(one, bytes) else str(one)).strip()
 
 
 def recognises(path: Path) -> bool:

@@ -6,6 +6,7 @@ or RAS that is taken for mm and LPS is another wire. A frame without a usable wi
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ from pipeline.arrays.polyline import UNITS_MM
 from pipeline.load.curves import READERS, distinct, points_in_table
 from pipeline.load.geometry import LoadError, Source, refused, unusable
 from pipeline.load.guard import size_of
-from pipeline.load.hdf5 import require_written
+from pipeline.load.hdf5 import require_written, text_of
 from pipeline.load.order import last_counts
 from pipeline.load.outside import millimetres, to_whole
 from pipeline.load.stated import stated_in, stated_in_table
@@ -24,14 +25,21 @@ from pipeline.load.surfaces import RAS_TO_LPS
 from pipeline.load.tables import rows_of
 from pipeline.load.vtk import read_vtk_points
 from pipeline.model import Array
+from pipeline.status import FrameStatus
 from reports.result_file import read_result
 from reports.texts import UnreadableError
+from solver import Status
 
 OF_KIND = {**READERS, ".vtk": read_vtk_points}
 IN_HDF5 = (".h5", ".hdf5")
 KINDS = (".csv", *OF_KIND, *IN_HDF5)
 USUAL = {"space": "LPS", "unit": "mm"}
 """What is stated of coordinates, in the order of ``stated_in``, and what most have."""
+ATTRIBUTES = {"coordinates": "space", "space": "space", "length_unit": "unit", "unit": "unit"}
+"""By which a HDF5 file, or a dataset in it, states them."""
+_JUDGED = "UNDER_RESOLVED", "SELF_CONTACT", "SIMULATE_FAILED", "CURVE_UNUSABLE", "NOT_TO_DEPTH"
+REFUSED = {s.identifier: s.value for s in (*Status, *map(FrameStatus.__getitem__, _JUDGED)) if s != Status.CONVERGED}
+"""Sentences on wires that a run refuses, by the status of their frames; other statuses are of traces."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +119,10 @@ def _in_hdf5(path: Path, count: int, space: str, unit: str) -> list[OtherFile]:
     try:
         with h5py.File(path, "r") as file:
             groups = _by_number(path, file["frames"])
-            points = {n: _written(path, g["simulated_mm"]) for n, g in groups.items() if "simulated_mm" in g}
+            wires = {n: group["simulated_mm"] for n, group in groups.items() if "simulated_mm" in group}
+            _require_usual(path, file, *wires.values())
+            points = {n: _written(path, wire) for n, wire in wires.items()}
+            said = {n: text_of(groups[n].attrs.get("status", "")) for n in wires}
     except (OSError, KeyError, ValueError, AttributeError, TypeError, RuntimeError) as error:
         what, allowed = "no HDF5 file, or one of another layout", "/frames/NNN/simulated_mm (n, 3), NNN from 0"
         raise refused(path, what, allowed, "write it so") from error
@@ -120,9 +131,19 @@ def _in_hdf5(path: Path, count: int, space: str, unit: str) -> list[OtherFile]:
         raise unusable(path, f"got frame {beyond[0]} for {count} frames; number them from 0 to {count - 1}")
     missing = OtherFile(path.name, problem="it has no simulated_mm for this frame", missing=True)
     read = {n: replace(_checked(f"{path.name}#{n}", wire), where=f"{path}#{n}") for n, wire in points.items()}
-    own = _refused_beside(path)
+    own = {n: (s, REFUSED[s], "") for n, s in said.items() if s in REFUSED} | _refused_beside(path)
     found = {n: replace(file, refused=own.get(n, file.refused)) for n, file in read.items()}
     return [found.get(n, missing) for n in range(count)]
+
+
+def _require_usual(path: Path, *stating: h5py.File | h5py.Dataset) -> None:
+    """LoadError where the file, or a wire in it, states another space or unit than its layout has."""
+    for held, (name, what) in product(stating, ATTRIBUTES.items()):
+        said = text_of(held.attrs.get(name, USUAL[what]))
+        usual = said.upper() == "LPS" if what == "space" else UNITS_MM.get(said.lower()) == 1.0
+        if not usual:
+            where = f"{held.name}: attribute {name} is {said!r}"
+            raise unusable(path, f"{where}; the layout of frames.h5 is LPS mm; convert the points, or write CSV files")
 
 
 def _refused_beside(wires: Path) -> dict[int, tuple[str, ...]]:

@@ -357,19 +357,70 @@ def test_wires_with_the_depths_of_other_frames_are_told() -> None:
 
 @pytest.mark.parametrize(
     ("shift_mm", "noise_mm", "told"),
-    [((0.0, 3.0, 0.0), 0.01, True), ((0.0, 0.3, 0.0), 0.0, False), ((1.0, 0.0, 0.0), 0.6, False)],
+    [
+        ((0.0, 3.0, 0.0), 0.01, "(0.0, 3.0"),
+        ((0.0, 0.3, 0.0), 0.0, ""),
+        ((0.25, 0.25, 0.25), 0.05, "scans (a voxel's corner lies half a voxel from its middle"),
+        ((1.0, 0.0, 0.0), 0.6, ""),
+    ],
 )
-def test_wires_that_all_lie_aside_are_told(shift_mm: tuple[float, ...], noise_mm: float, told: bool) -> None:
-    """3 mm in y: what was said was of axes and rolls."""
+def test_wires_that_all_lie_aside_are_told(shift_mm: tuple[float, ...], noise_mm: float, told: str) -> None:
+    """3 mm in y: what was said was of axes and rolls. Half a voxel along each axis was not told."""
     rng, frames = np.random.default_rng(0), []
     for n in range(3):
         line = np.column_stack([np.zeros((30, 2)), np.linspace(0.0, 20.0 + 5.0 * n, 30)])
         wire = line + shift_mm + rng.normal(0.0, noise_mm, line.shape)
         frames.append(Frame(n, curve=Curve(line, np.full(30, 0.02)), simulated=OtherWire(wire, 0.0)))
-    said = _aside(frames)
-    assert bool(said) == told
-    assert not told or said[0].startswith("the wires lie (0.0, 3.0")
-    assert _aside([Frame(0)]) == []
+    said = _aside(frames, 0.7)
+    assert bool(said) == bool(told)
+    assert told in "".join(said)
+    assert _aside([Frame(0)], 0.7) == []
+
+
+def test_wires_that_begin_far_beyond_the_clamp_are_told(known: Known, tmp_path: Path) -> None:
+    """3 mm beyond it, "few points, give a point every millimetre" was the advice; they had one every half."""
+    folder = write_csv(tmp_path / "late", [resample(wire, 0.5)[6:] for wire in known[1]])
+    code, _, result = run_with(known, f'"{folder}/*.csv"', "late")
+    assert code == 0
+    (said,) = (text for text in result["warnings"] if "begin beyond the clamp's plane" in text)
+    assert "frame 0: 3.0 mm" in said
+    assert not any("few points" in text for text in result["warnings"])
+
+
+@pytest.mark.parametrize(
+    ("held", "name", "value", "refused"),
+    [
+        ("/", "coordinates", b"RAS", True),
+        ("/", "length_unit", "m", True),
+        ("/frames/000/simulated_mm", "unit", np.array(["cm"], h5py.string_dtype()), True),
+        ("/", "coordinates", "lps", False),
+        ("/", "length_unit", "millimetre", False),
+    ],
+)
+def test_what_hdf5_wires_state_is_read(
+    known: Known, tmp_path: Path, held: str, name: str, value: object, refused: bool
+) -> None:
+    """Attributes were not read: wires in RAS were 13 mm off, and ok."""
+    wires = tmp_path / "wires.h5"
+    with h5py.File(wires, "w") as file:
+        file["frames/000/simulated_mm"] = known[1][0]
+        file[held].attrs[name] = value
+    if refused:
+        with pytest.raises(LoadError, match=rf"wires\.h5: {held}: attribute {name} is '\w+'; .* is LPS mm"):
+            read_wires([Source(wires)], 1)
+    else:
+        assert read_wires([Source(wires)], 1)[0].points_mm is not None
+
+
+def test_a_wire_that_its_file_calls_not_at_rest_has_failed(known: Known, tmp_path: Path) -> None:
+    """Without the result of the run beside it, the status in the file was not read: ok."""
+    with h5py.File(tmp_path / "wires.h5", "w") as file:
+        for n, status in enumerate(("ok", "max_iterations", "trace_failed", "under_resolved")):
+            file[f"frames/{n:03d}/simulated_mm"] = known[1][n]
+            file[f"frames/{n:03d}"].attrs["status"] = status
+    refused = [file.refused for file in read_wires([Source(tmp_path / "wires.h5")], 4)]
+    assert [status for status, *_ in refused] == ["", "max_iterations", "", "under_resolved"]
+    assert "iteration limit" in refused[1][1]
 
 
 def test_a_score_of_swapped_wires_says_so(known: Known, tmp_path: Path) -> None:

@@ -140,14 +140,15 @@ def test_a_wide_interval_of_few_insertions_is_no_fault_of_the_wire() -> None:
 
 
 @pytest.mark.parametrize(
-    ("along", "said"), [(-1.9, "ends 1.90 mm short"), (1.9, "ends 1.90 mm beyond"), (None, "has its tip 1.90 mm off")]
+    ("along", "said"),
+    [(-1.9, "1.90 mm short along the vessel"), (1.9, "1.90 mm farther along the vessel"), (None, "1.90 mm off")],
 )
 def test_a_wire_that_ends_elsewhere_is_not_called_better(along: float | None, said: str) -> None:
     """Errors go from the simulated wire to the traced one: what it leaves out is in none of them."""
     row = {"rms_mm": 0.1, "tip_median_mm": 1.9, "tip_along_median_mm": along}
     row |= {"skill_strongest": 0.9, "skill_strongest_low": 0.8, "strongest_null": "previous"}
     assert badge("ok", True, row) == {"text": "the tips lie off", "look": "poor"}
-    assert f"The wire {said} (median)" in verdict(row)
+    assert f"The wire's tip lies {said} (median)" in verdict(row)
     assert ("rms_mm does not see that" in verdict(row)) is (along != 1.9), "what lies beyond the trace is seen"
     assert ("judge by tip_median_mm and back_rms_mm" in verdict(row)) is (along != 1.9)
     assert "The wire is better" not in verdict(row)
@@ -285,6 +286,8 @@ def test_a_wrong_roll_is_guessed_at() -> None:
         in verdict(row)
     )
     assert "check axes" not in verdict(row | {"null_roll_unknown_rms_mm": 1.9})
+    of_another = verdict(row, simulator="floppy")  # "the wire lies nearer" read as if it were the simulator's
+    assert "Wires of wireval, not told the roll, lie nearer (0.820 mm)" in of_another
     said = verdict(row)  # it was said twice, and "That is worse" had lost its noun
     assert said.count("worse") == 1
     assert said.index("The wire is worse (skill -1.00)") < said.index("With an unknown roll")
@@ -303,7 +306,7 @@ def test_a_roll_is_to_be_fitted_only_where_it_can_be_and_is_not() -> None:
     assert 'roll_deg = "fit"' not in fitted
     assert "the roll was fitted on a frame: state it, or begin deeper" in fitted
     assert 'roll_deg = "fit"' not in verdict(row, "sofa")
-    assert "the roll that it was simulated with" in verdict(row, "sofa")
+    assert "the roll that this one was simulated with" in verdict(row, "sofa")
 
 
 def test_a_run_without_a_score_says_why() -> None:

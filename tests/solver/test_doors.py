@@ -40,6 +40,7 @@ NOT_TABLES += [[[np.inf, 1.0]], [[5, 1.0], [0, 2.0]], [[-1.0, 1.0]], [[0.0, 1.0]
 NOT_TABLES += [
     lambda s: 0.5 if s < 30.0 else 5.0,
     lambda s: math.exp(s),
+    lambda s: {}[float(s[0])],
     lambda s: s * np.nan,
     lambda s: "1",
     lambda s: None,
@@ -419,6 +420,25 @@ def test_an_undefined_frame_behind_the_doors_is_not_called_converged_either(
 ) -> None:
     monkeypatch.setattr(sys.modules["solver.relax"], "base_frame", lambda *_: np.full((3, 3), np.nan))
     assert relaxed(method=method).status is solver.Status.NON_FINITE
+
+
+def test_what_is_recommended_for_a_mask_leaves_thick_slices_their_lumen() -> None:
+    """A filter of one voxel along each axis, 2 mm here, closed the lumen altogether."""
+    spacing_mm = [0.35, 0.35, 2.0]
+    y, _, z = np.meshgrid(*(np.arange(-a, a, h) for a, h in zip((4, 8, 5), spacing_mm, strict=True)), indexing="ij")
+    names = {name: getattr(ndimage, name) for name in ("distance_transform_edt", "gaussian_filter")}
+    mask = np.hypot(y, z) < 1.2  # along x, in the plane of the slices
+    made = eval(MAKE_A_DISTANCE.partition(": ")[2], names | {"mask": mask, "spacing_mm": spacing_mm})
+    assert made[mask].max() < -0.2, "0.7 by one voxel along each axis"
+
+
+def test_a_distance_that_is_cut_off_is_warned_of() -> None:
+    """Narrow bands: beyond them no wall pushes back, and stiff wires lay 9 mm outside the lumen, at rest."""
+    grid = tube_grid()
+    with pytest.warns(UserWarning, match=r"cut off at 0.5 mm outside the lumen.*up to 1 mm and more"):
+        VesselWall(grid.with_values(solver.grid.read_only(np.clip(grid.values, -0.5, 0.5))), 1.0)
+    for most in (1.0, 3.0):
+        assert not VesselWall(grid.with_values(solver.grid.read_only(np.minimum(grid.values, most))), 1.0).doubts
 
 
 def test_what_is_recommended_for_a_mask_is_a_distance() -> None:

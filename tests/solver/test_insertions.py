@@ -164,13 +164,13 @@ def test_eight_places_are_looked_up_as_one_by_one(away: float) -> None:
     points = np.random.default_rng(3).uniform(-2.0, 20.0, (WIDTH, 3)) + away
     value, slope, bend = wall.look_up(points)
     second = bend[:, [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
-    found[:3] = points.T
+    found[:3] = (points - wall.middle_mm).T
     look_up_eight(wall.field, found, False)
     np.testing.assert_allclose(found[:10].T, np.column_stack([value, slope, second]), rtol=1e-12, atol=1e-12)
     # beyond the grid it counts as touching
     assert np.all((found[10] >= value - 1e-12) | (found[10] == 1.0))
     assert np.all(found[10] == 1.0) == (away > 0.0)
-    found[:3] = points.T
+    found[:3] = (points - wall.middle_mm).T
     look_up_eight(wall.field, found, True)
     np.testing.assert_allclose(found[0], value, rtol=1e-12, atol=1e-12)
 

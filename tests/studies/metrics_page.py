@@ -11,7 +11,8 @@ PAGE = Path(__file__).resolve().parents[2] / "docs" / "metrics.md"
 HEAD = """# What is measured of a frame
 
 In the formulas w are points of the simulated wire, and c points of the traced curve. Both lie at equal steps
-(`compare.sample_mm`) of the arc length s from the entry, and at the tip. g is the wire of a trivial predictor, cut at
+(`compare.sample_mm`) of the arc length s from the entry, and at the tip. The clamp's reach (`compare.skip_mm`) is left
+out, which is 10 mm, and of wires shorter than 12 mm all but the last 2. g is the wire of a trivial predictor, cut at
 the frame's depth, with points where w has them. A case pools over its frames that are ok. overall.csv does so over all
 validation cases.
 

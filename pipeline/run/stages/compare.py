@@ -160,7 +160,7 @@ def _tips_elsewhere(frames: Sequence[Frame], least_mm: float) -> dict[int, float
 def _rough_truth(known: Known) -> list[str]:
     """A warning of true wires whose points are so far apart that they cut corners."""
     wires = {f.index: f.truth_mm for f in known.frames if f.truth_mm is not None}
-    return rough(wires, known.vessel.distance.voxel_mm, "the true wires", "give a point every millimetre")
+    return rough(wires, known.vessel.distance.voxel_mm, "the true wires")
 
 
 def _too_near(frames: Sequence[Frame], sample_mm: float, *, handed: bool) -> list[str]:

@@ -28,15 +28,20 @@ from pipeline.simulate.others import (
 )
 from pipeline.status import FrameStatus
 from pipeline.study.manifest import Case
-from reports.case_files import counted
+from reports.case_files import counted, listed
 from reports.doubts import OF_THEIR_RUN
 from solver.self_contact import self_overlap_mm
 
 STEP_MM = 0.25
-LEAST_ASIDE_MM, MOST_LEFT = 0.5, 0.35
-"""Shift of all wires against the traced ones from which it is told, and the share of it that may be left without it."""
+LEAST_ASIDE_MM, LEAST_ASIDE_VOXELS, MOST_LEFT = 0.5, 0.5, 0.35
+"""Shift of all wires against the traced ones from which it is told, whichever is less, and the share of it that may be
+left without it. From a voxel's corner to its middle it is half a voxel along each axis."""
+LATE_MM = 1.0
+"""How far beyond the clamp's plane a wire may begin unsaid: a straight line to it passes 0.05 mm beside a bend of 10 mm
+radius."""
 MOST_OUTSIDE = 0.2
 """Share of a wire outside the lumen from which on it is asked whether its x and y are turned."""
+MOST_NAMED = 6
 FAR_RADII = 3.0
 """How many of its radii a wire's axis may lie beyond the wall unsaid: a tip 0.9 mm beyond it, in all frames, was."""
 
@@ -60,8 +65,10 @@ def frames_of_others(run: Context, known: Known) -> tuple[Frame, ...]:
     wires = {f.index: f.simulated.joints_mm for f in frames if f.simulated is not None}
     voxel_mm = known.vessel.distance.voxel_mm
     log.warnings += _in_another_order(frames)
-    log.warnings += [*_outside(known, wires, case), *_aside(frames)]
-    log.warnings += rough(wires, voxel_mm, "the simulated wires", "give a point every millimetre")
+    log.warnings += [*_outside(known, wires, case), *_aside(frames, voxel_mm)]
+    late = _begun_late(known, files)
+    log.warnings += _told_late(late)
+    log.warnings += rough({n: wires[n][n in late :] for n in wires}, voxel_mm, "the simulated wires")
     log.warnings += _kinked(wires, case.wire)
     return tuple(frames)
 
@@ -148,7 +155,25 @@ def _clearance(known: Known, points: Array) -> Array:
     return wall_of(known.vessel.distance, "offset").look_up(resample(points, STEP_MM))[0]
 
 
-def _aside(frames: Sequence[Frame]) -> list[str]:
+def _begun_late(known: Known, files: Sequence[OtherFile]) -> dict[int, float]:
+    """By frame how far beyond the clamp's plane its wire begins, mm, where that is more than LATE_MM."""
+    entry, along = known.held.entry_mm, known.held.direction
+    begins = {n: float((f.points_mm[0] - entry) @ along) for n, f in enumerate(files) if f.points_mm is not None}
+    return {known.frames[n].index: mm for n, mm in begins.items() if mm > LATE_MM}
+
+
+def _told_late(late: Mapping[int, float]) -> list[str]:
+    """A warning of wires whose first part is missing."""
+    if not late:
+        return []
+    each = listed([f"frame {n}: {mm:.1f} mm" for n, mm in late.items()], MOST_NAMED)
+    return [
+        f"wires begin beyond the clamp's plane ({each}): up to there they count as straight lines along its direction; "
+        "write the wire from the clamp on"
+    ]
+
+
+def _aside(frames: Sequence[Frame], voxel_mm: float) -> list[str]:
     """A warning where all wires lie aside from the traced ones by one and the same shift, and near without it."""
     pairs = [(f.curve.points_mm, f.simulated.joints_mm) for f in frames if f.curve and f.traced and f.simulated]
     if not pairs:
@@ -160,12 +185,13 @@ def _aside(frames: Sequence[Frame]) -> list[str]:
     every = np.concatenate(apart)
     shift = every.mean(axis=0)
     left, size = rms(np.linalg.norm(every - shift, axis=1)), float(np.linalg.norm(shift))
-    if size < LEAST_ASIDE_MM or left > MOST_LEFT * size:
+    if size < min(LEAST_ASIDE_MM, LEAST_ASIDE_VOXELS * voxel_mm) or left > MOST_LEFT * size:
         return []
     place = spelt(shift)
+    corner = " (a voxel's corner lies half a voxel from its middle along each axis)" * (size < 2.0 * voxel_mm)
     return [
         f"the wires lie ({place}) mm aside from the traced ones, alike in {counted(len(pairs), 'frame')} (without that "
-        f"{left:.2g} mm rms are left): is their origin that of the scans?"
+        f"{left:.2g} mm rms are left): is their origin that of the scans{corner}?"
     ]
 
 

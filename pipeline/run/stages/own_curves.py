@@ -4,7 +4,7 @@ No scan has to be there for that. A curve in straight lines from voxel to voxel 
 simulated beside it; one of few points cuts its own corners; one in another vessel is no wire of this lumen.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -106,18 +106,21 @@ def _in_lumen(curve: Curve, distance: Grid, stiffness_N_mm2: float) -> Curve:
     return curve.doubted(FrameStatus.TRACE_LEFT_LUMEN, note)
 
 
-def rough(curves: Mapping[int, Array], voxel_mm: float, whose: str, mend: str) -> list[str]:
+def rough(curves: Mapping[int, Array], voxel_mm: float, whose: str, mend: str = "") -> list[str]:
     """Warnings of curves (n, 3), by frame, that cut the wire's corners, or are jagged. whose, mend : words for it."""
-    told = {frame: _cut(points, CORNER_VOXELS * voxel_mm) for frame, points in curves.items()}
+    allowed_mm = CORNER_VOXELS * voxel_mm
+    told = {frame: _cut(points, allowed_mm) for frame, points in curves.items()}
     cut = {frame: text for frame, text in told.items() if text}
     longer = {n: share for n in cut if (share := jagged(curves[n]))}
     coarse = [f"frame {n}: {text}" for n, text in cut.items() if n not in longer]
     said = []
     if coarse:
+        apart_mm = _apart_mm((curves[n] for n in cut if n not in longer), allowed_mm)
         mostly = f" ({MOSTLY_LINES})" * (2 * sum(_LINE in text for text in told.values()) > len(told))
         said.append(
             f"{whose} have few points{mostly}: straight lines between them pass beside a smooth wire "
-            f"({listed(coarse, MOST_NAMED)}; they may pass {CORNER_VOXELS * voxel_mm:.2f} mm beside it): {mend}"
+            f"({listed(coarse, MOST_NAMED)}; they may pass {allowed_mm:.2f} mm beside it): "
+            f"{mend or f'give a point every {apart_mm:.1g} mm'}"
         )
     if longer:
         each = listed([f"frame {n}: {100.0 * share:.1f} %" for n, share in longer.items()], MOST_NAMED)
@@ -141,6 +144,16 @@ def _cut(points_mm: Array, allowed_mm: float) -> str:
         return f"{length:.1f} {_LINE}" if longest**2 / (8.0 * UNSEEN_RADIUS_MM) > allowed_mm else ""
     mm = corner_mm(points_mm)
     return f"{mm:.2f} mm beside it" if mm > allowed_mm else ""
+
+
+def _apart_mm(curves: Iterable[Array], allowed_mm: float) -> float:
+    """How far apart the points of these curves may lie: a line passes beside an arc with the square of its length."""
+    found = []
+    for points in curves:
+        longest = float(np.linalg.norm(np.diff(points, axis=0), axis=1).max())
+        off_mm = max(corner_mm(points), longest**2 / (8.0 * UNSEEN_RADIUS_MM))
+        found.append(longest * float(np.sqrt(allowed_mm / off_mm)))
+    return min(1.0, *found)
 
 
 def jagged(points_mm: Array) -> float:
