@@ -194,6 +194,23 @@ def test_the_curve_turns_with_the_volume():
     assert point_to_curve(other.points_mm, plain.points_mm)[0].max() < 0.1 * VOXEL
 
 
+@pytest.mark.parametrize("has_reference", [True, False])
+def test_greys_in_another_unit_make_no_other_curve(has_reference):
+    """Attenuation per mm, say, in which all noise lies far below 1."""
+    curves = []
+    for scale, level in ((1.0, 0.0), (1e-3, -1.0)):
+        frame, reference = (
+            replace(scan, values=np.float32(scale * scan.values.astype(float) + level), made_of=None)
+            for scan in scans(8)[:2]
+        )
+        lumen = segment(reference, vessel()[4][None])
+        curves.append(trace(frame, lumen, *vessel()[4:6], reference=reference if has_reference else None))
+    here, there = curves
+    assert here.status is there.status is FrameStatus.OK
+    np.testing.assert_allclose(here.points_mm, there.points_mm, rtol=0.0, atol=1e-5)  # float32 holds 1 to 6e-8
+    np.testing.assert_allclose(here.sigma_mm, there.sigma_mm, rtol=1e-4, atol=0.0)
+
+
 def fading(shape, origin, wire):
     """Share of the contrast at every voxel: it falls by a third along z and is lowest at the tip."""
     z = origin[2] + VOXEL * np.arange(shape[2])
