@@ -17,7 +17,7 @@ NOTHING = "–"
 _LEVEL = {"min", "median", "max"}
 _WITH_INTERVAL = ("rms_mm", "skill_strongest")
 """Numbers at the head of a page that say so where they have no interval."""
-_FEWER = "It is over the frames of which all predictors have a guess: of the two rms beside it another one comes out."
+_FEWER = "It is over the frames for which every predictor has a guess; the two rms beside it are over other frames."
 MOST_TILES = 6
 """Of the numbers at the head of a page so many are tiles, which a reader decides by; the others stand in a table."""
 

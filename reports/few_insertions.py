@@ -32,7 +32,9 @@ def narrow_of_short(statistics: Mapping[str, Any]) -> str:
     if isnan(value_of(statistics.get("rms_low_mm"))) or not good < SHORT * of:
         return ""
     frames = counted(max(1, floor(good / of)), "frame")
-    return f"Insertions of {frames} seldom hold one that is far off: below {SHORT}, intervals may be too narrow."
+    return (
+        f"A rare frame that is far off is missed by insertions of {frames}: below {SHORT}, intervals may be too narrow."
+    )
 
 
 def alone_in(statistics: Mapping[str, Any], skill: float, least: float, most: float) -> str:

@@ -60,7 +60,7 @@ def test_a_tile_says_where_it_is_over_fewer_frames_than_those_beside_it() -> Non
     row = {"skill_strongest": 0.9, "strongest_frames": 5, "frames_ok": 6}
     card = _content.cards(entries, row)[0]
     assert card["label"] == "skill over 5 of 6 frames, the rms over more", "all of it made eight lines of a narrow tile"
-    assert card["why"].endswith("all predictors have a guess: of the two rms beside it another one comes out.")
+    assert card["why"].endswith("every predictor has a guess; the two rms beside it are over other frames.")
     assert _content.cards(entries, row | {"strongest_frames": 6}) == [{"value": "0.900", "label": "skill"}]
     explained = [entries[0] | {"why": "1 is perfect."}]
     assert _content.cards(explained, row)[0]["why"].startswith("1 is perfect. It is over")
