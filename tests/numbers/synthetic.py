@@ -50,6 +50,9 @@ def planned() -> Numbers:
         wires = [digest(points) + [radius] for points, radius in setup.others]
         wire = [setup.wire.radius_mm, setup.wire.bending_N_mm2, setup.wire.rest_curvature_per_mm]
         found[f"{name}-scanned"] = [*scan, *astuple(setup.greys), *np.ravel(wires), *np.hstack([*map(np.ravel, wire)])]
+        if setup.bone is not None:
+            bone = distances(setup.bone)
+            found[f"{name}-bone"] = [*np.ravel(bone["distance"]), *np.ravel(bone["tubes"])]
         vessels = distances(setup.anatomy)
         found[name] = [*place, *plan, *shown, *np.ravel(vessels["distance"]), *np.ravel(vessels["gradient"])]
     return found
