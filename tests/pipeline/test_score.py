@@ -377,6 +377,26 @@ def test_wires_that_all_lie_aside_are_told(shift_mm: tuple[float, ...], noise_mm
     assert _aside([Frame(0)], 0.7) == []
 
 
+def test_a_shift_along_a_wire_is_told_where_it_bends_and_not_where_it_is_pushed_too_far() -> None:
+    """Half a voxel along each axis, cut at the clamp's plane, was not told: places of equal arc length are others."""
+    turned = np.linspace(0.0, 1.5, 200)
+    curve = 25.0 * np.column_stack([np.zeros(200), 1.0 - np.cos(turned), np.sin(turned)])
+    shifted = begun(curve + [0.2, -0.2, 0.2], np.zeros(3), np.array([0.0, 0.0, 1.0]))
+    tip = np.column_stack([np.zeros(40), np.linspace(0.0, 1.0, 40) ** 2, np.linspace(0.0, 4.0, 40)])
+    straight, too_far = (
+        np.concatenate([[[0.0, 0.0, z] for z in np.arange(0.0, ends, 0.5)], tip + [0.0, 0.0, ends]])
+        for ends in (20.0, 21.2)
+    )
+
+    def said(traced: Array, wire: Array) -> list[str]:
+        curve = Curve(traced, np.full(len(traced), 0.02))
+        return _aside([Frame(0, curve=curve, simulated=OtherWire(wire, 0.0))], 0.3)
+
+    assert said(curve, shifted)[0].startswith("the wires lie (0.2, -0.2, 0.2) mm aside")
+    assert said(straight, too_far) == []
+    assert said(curve, curve[:1] - [0.0, 0.0, 3.0] * np.arange(2)[:, None]) == [], "it lies nowhere beside the curve"
+
+
 def test_wires_that_begin_far_beyond_the_clamp_are_told(known: Known, tmp_path: Path) -> None:
     """3 mm beyond it, "few points, give a point every millimetre" was the advice; they had one every half."""
     folder = write_csv(tmp_path / "late", [resample(wire, 0.5)[6:] for wire in known[1]])

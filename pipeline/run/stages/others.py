@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.arrays.grids import spelt
-from pipeline.arrays.polyline import at_arc, resample, samples
-from pipeline.compare.metrics import rms
+from pipeline.arrays.polyline import at_arc, resample, tangents
+from pipeline.compare.metrics import point_to_curve, rms
 from pipeline.load.wires import OtherFile, read_wires, warned_beside
 from pipeline.model import Array, OtherWire, Wire, arc_length
 from pipeline.run.stages.in_itself import not_in_itself
@@ -36,6 +36,9 @@ STEP_MM = 0.25
 LEAST_ASIDE_MM, LEAST_ASIDE_VOXELS, MOST_LEFT = 0.5, 0.5, 0.35
 """Shift of all wires against the traced ones from which it is told, whichever is less, and the share of it that may be
 left without it. From a voxel's corner to its middle it is half a voxel along each axis."""
+SHIFT_ROUNDS, LOOSE = 4, 0.1
+"""Rounds in which the shift is found, and the share of the best known direction's weight below which a direction is not
+known: in a straight tube a wire that is pushed too far would lie aside along it."""
 LATE_MM = 1.0
 """How far beyond the clamp's plane a wire may begin unsaid: a straight line to it passes 0.05 mm beside a bend of 10 mm
 radius."""
@@ -178,13 +181,8 @@ def _aside(frames: Sequence[Frame], voxel_mm: float) -> list[str]:
     pairs = [(f.curve.points_mm, f.simulated.joints_mm) for f in frames if f.curve and f.traced and f.simulated]
     if not pairs:
         return []
-    apart = []
-    for traced, wire in pairs:
-        arc = samples(min(float(arc_length(points)[-1]) for points in (traced, wire)), STEP_MM)
-        apart.append(at_arc(wire, arc) - at_arc(traced, arc))
-    every = np.concatenate(apart)
-    shift = every.mean(axis=0)
-    left, size = rms(np.linalg.norm(every - shift, axis=1)), float(np.linalg.norm(shift))
+    shift, left = _shift_between(pairs)
+    size = float(np.linalg.norm(shift))
     if size < min(LEAST_ASIDE_MM, LEAST_ASIDE_VOXELS * voxel_mm) or left > MOST_LEFT * size:
         return []
     place = spelt(shift)
@@ -193,6 +191,31 @@ def _aside(frames: Sequence[Frame], voxel_mm: float) -> list[str]:
         f"the wires lie ({place}) mm aside from the traced ones, alike in {counted(len(pairs), 'frame')} (without that "
         f"{left:.2g} mm rms are left): is their origin that of the scans{corner}?"
     ]
+
+
+def _shift_between(pairs: Sequence[tuple[Array, Array]]) -> tuple[Array, float]:
+    """The shift (3,) from curves to wires, (n, 3) each, that is common to all pairs, and the distance without it, rms.
+
+    By what lies across the curve: a wire that is shifted along itself is cut at the clamp's plane, so that places of
+    the same arc length are others. Along straight curves none is found.
+    """
+    shift, left = np.zeros(3), np.inf
+    for _ in range(SHIFT_ROUNDS):
+        offs, ways = [], []
+        for curve, wire in pairs:
+            points = resample(wire, STEP_MM) - shift
+            feet = point_to_curve(points, curve)[1]
+            between = (feet > 0.0) & (feet < float(arc_length(curve)[-1]))  # beyond its ends a curve is no line
+            offs.append((points - at_arc(curve, feet))[between])
+            ways.append(tangents(curve, feet[between], STEP_MM))
+        off, way = np.concatenate(offs), np.concatenate(ways)
+        if not len(off):
+            return np.zeros(3), np.inf
+        across = np.eye(3) - way[:, :, None] * way[:, None, :]
+        off = np.einsum("nij,nj->ni", across, off)
+        left = rms(np.linalg.norm(off, axis=1))
+        shift = shift + np.linalg.pinv(across.sum(axis=0), rcond=LOOSE, hermitian=True) @ off.sum(axis=0)
+    return shift, left
 
 
 def _outside(known: Known, wires: Mapping[int, Array], case: Case) -> list[str]:
