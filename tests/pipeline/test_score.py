@@ -358,7 +358,7 @@ def test_wires_with_the_depths_of_other_frames_are_told() -> None:
 @pytest.mark.parametrize(
     ("shift_mm", "noise_mm", "told"),
     [
-        ((0.0, 3.0, 0.0), 0.01, "(0.0, 3.0"),
+        ((0.0, 3.0, 0.0), 0.01, "3.00, "),
         ((0.0, 0.3, 0.0), 0.0, ""),
         ((0.25, 0.25, 0.25), 0.05, "scans (a voxel's corner lies half a voxel from its middle"),
         ((1.0, 0.0, 0.0), 0.6, ""),
@@ -392,7 +392,7 @@ def test_a_shift_along_a_wire_is_told_where_it_bends_and_not_where_it_is_pushed_
         curve = Curve(traced, np.full(len(traced), 0.02))
         return _aside([Frame(0, curve=curve, simulated=OtherWire(wire, 0.0))], 0.3)
 
-    assert said(curve, shifted)[0].startswith("the wires lie (0.2, -0.2, 0.2) mm aside")
+    assert said(curve, shifted)[0].startswith("the wires lie (0.20, -0.20, 0.20) mm aside")
     assert said(straight, too_far) == []
     assert said(curve, curve[:1] - [0.0, 0.0, 3.0] * np.arange(2)[:, None]) == [], "it lies nowhere beside the curve"
 

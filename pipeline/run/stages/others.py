@@ -185,7 +185,7 @@ def _aside(frames: Sequence[Frame], voxel_mm: float) -> list[str]:
     size = float(np.linalg.norm(shift))
     if size < min(LEAST_ASIDE_MM, LEAST_ASIDE_VOXELS * voxel_mm) or left > MOST_LEFT * size:
         return []
-    place = spelt(shift)
+    place = spelt(shift, 2)
     corner = " (a voxel's corner lies half a voxel from its middle along each axis)" * (size < 2.0 * voxel_mm)
     return [
         f"the wires lie ({place}) mm aside from the traced ones, alike in {counted(len(pairs), 'frame')} (without that "
