@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
 
 from pipeline.load import LoadError, load, read_header
 from pipeline.load.config import LoadConfig
+from pipeline.load.slices import Pixels, grey
 from tests.pipeline.enhanced_dicom import enhanced
 from tests.pipeline.test_load import numbered, straight_stack
 from tests.studies.formats.base import ORIGIN, SPACING
@@ -80,3 +82,21 @@ def test_a_number_of_half_a_length_is_a_sentence(tmp_path: Path) -> None:
     path.write_bytes(whole.replace(head, b"\x28\x00\x00\x01US\x03\x00\x00"))
     with pytest.raises(LoadError, match="contradicts its format"):
         read_header(path)
+
+
+@pytest.mark.parametrize(
+    ("kind", "inverted", "greys"),
+    [
+        ("<i2", False, [-5, 7, -2048]),
+        ("<i2", True, [4, -8, 2047]),
+        ("<u2", False, [4091, 7, 2048]),
+        ("<u2", True, [4, 4088, 2047]),
+    ],
+)
+def test_bits_that_count_are_taken_out_of_wider_values_and_turned_where_white_is_low(
+    kind: str, inverted: bool, greys: list[int]
+) -> None:
+    """12 bits of 16, the highest the 14th of 0 to 15; above and below them is what does not count."""
+    stored = (np.array([0xFFB, 7, 0x800], np.uint16) << 3 | 0x8005).view(kind)
+    pixels = Pixels(1, 3, 0, kind, 12, 14, inverted)
+    assert grey(Mock(pixels=pixels), stored).tolist() == greys

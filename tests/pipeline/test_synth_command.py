@@ -39,6 +39,12 @@ def test_wrong_words(tmp_path: Path, capsys: pytest.CaptureFixture[str], words: 
     assert not (tmp_path / "out").exists()
 
 
+def test_a_folder_is_a_background_of_slices_and_no_anatomy(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for option, expected in (("--anatomy", "this is a folder"), ("--background", "holds no DICOM series")):
+        assert main(["synth", option, str(tmp_path), "-o", str(tmp_path / "out")]) == 2
+        assert expected in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("words", "expected"),
     [
