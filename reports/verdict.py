@@ -160,7 +160,7 @@ def _unknown_roll(statistics: Mapping[str, Any], simulator: str, caveats: Caveat
         return ""
     mend = 'check axes (LPS or RAS) and roll; roll_deg = "fit" finds the roll of a wire that is simulated here'
     if simulator not in ("", OURS):
-        nearer = f"Wires of {OURS}, not told the roll, lie nearer ({number(unknown)} mm)"
+        nearer = f"The mean of {OURS}'s wires of all rolls lies nearer ({number(unknown)} mm)"
         return f"{nearer}: check axes (LPS or RAS), and the roll that this one was simulated with."
     if value_of(statistics.get("frames_fitted")) > 0:
         mend = "check axes (LPS or RAS) and the wire's tip; the roll was fitted on a frame: state it, or begin deeper"

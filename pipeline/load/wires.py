@@ -4,6 +4,7 @@ What a file's numbers mean is stated, by the file, its format or whoever names i
 or RAS that is taken for mm and LPS is another wire. A frame without a usable wire is known as such and by its reason.
 """
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product
@@ -35,8 +36,9 @@ IN_HDF5 = (".h5", ".hdf5")
 KINDS = (".csv", *OF_KIND, *IN_HDF5)
 USUAL = {"space": "LPS", "unit": "mm"}
 """What is stated of coordinates, in the order of ``stated_in``, and what most have."""
-ATTRIBUTES = {"coordinates": "space", "space": "space", "length_unit": "unit", "unit": "unit"}
-"""By which a HDF5 file, or a dataset in it, states them."""
+ATTRIBUTES = {"coordinates": "space", "space": "space", "length_unit": "unit", "units": "unit", "unit": "unit"}
+"""By which a HDF5 file, a group or a dataset in it states them."""
+_OTHER_SPACE = re.compile(r"^(?!lps)[rl][ap][si]\b|right|anterior|inferior|ijk|index|(?:vox|pix)el", re.IGNORECASE)
 _JUDGED = "UNDER_RESOLVED", "SELF_CONTACT", "SIMULATE_FAILED", "CURVE_UNUSABLE", "NOT_TO_DEPTH"
 REFUSED = {s.identifier: s.value for s in (*Status, *map(FrameStatus.__getitem__, _JUDGED)) if s != Status.CONVERGED}
 """Sentences on wires that a run refuses, by the status of their frames; other statuses are of traces."""
@@ -120,9 +122,9 @@ def _in_hdf5(path: Path, count: int, space: str, unit: str) -> list[OtherFile]:
         with h5py.File(path, "r") as file:
             groups = _by_number(path, file["frames"])
             wires = {n: group["simulated_mm"] for n, group in groups.items() if "simulated_mm" in group}
-            _require_usual(path, file, *wires.values())
+            _require_usual(path, file, file["frames"], *groups.values(), *wires.values())
             points = {n: _written(path, wire) for n, wire in wires.items()}
-            said = {n: text_of(groups[n].attrs.get("status", "")) for n in wires}
+            said = {n: text_of(groups[n].attrs.get("status", "")).lower() for n in wires}
     except (OSError, KeyError, ValueError, AttributeError, TypeError, RuntimeError) as error:
         what, allowed = "no HDF5 file, or one of another layout", "/frames/NNN/simulated_mm (n, 3), NNN from 0"
         raise refused(path, what, allowed, "write it so") from error
@@ -136,12 +138,11 @@ def _in_hdf5(path: Path, count: int, space: str, unit: str) -> list[OtherFile]:
     return [found.get(n, missing) for n in range(count)]
 
 
-def _require_usual(path: Path, *stating: h5py.File | h5py.Dataset) -> None:
-    """LoadError where the file, or a wire in it, states another space or unit than its layout has."""
+def _require_usual(path: Path, *stating: h5py.HLObject) -> None:
+    """LoadError where the file, or something in it, states another space or unit than its layout has."""
     for held, (name, what) in product(stating, ATTRIBUTES.items()):
-        said = text_of(held.attrs.get(name, USUAL[what]))
-        usual = said.upper() == "LPS" if what == "space" else UNITS_MM.get(said.lower()) == 1.0
-        if not usual:
+        said = text_of(held.attrs.get(name, ""))
+        if _OTHER_SPACE.search(said) or (what == "unit" and UNITS_MM.get(said.lower().strip("[]() "), 1.0) != 1.0):
             where = f"{held.name}: attribute {name} is {said!r}"
             raise unusable(path, f"{where}; the layout of frames.h5 is LPS mm; convert the points, or write CSV files")
 

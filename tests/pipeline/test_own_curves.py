@@ -162,7 +162,7 @@ def test_a_jagged_curve_is_not_said_to_have_few_points() -> None:
     assert [" have few " in text for text in rough(few_too, 0.4, "the wires", "give more")] == [True, False]
 
 
-@pytest.mark.parametrize(("step_mm", "advised"), [(5.0, "1 mm"), (1.0, "0.7 mm")])
+@pytest.mark.parametrize(("step_mm", "advised"), [(5.0, "1 mm"), (1.0, "0.5 mm")])
 def test_how_many_points_a_curve_needs_is_told_by_its_bends(step_mm: float, advised: str) -> None:
     """A point every millimetre was the advice for curves that had it, with bends of 1.1 mm radius."""
     radius = 20.0 if step_mm > 1.0 else 1.1
@@ -170,6 +170,8 @@ def test_how_many_points_a_curve_needs_is_told_by_its_bends(step_mm: float, advi
     arc = radius * np.column_stack([np.cos(turned), np.sin(turned), np.zeros(len(turned))])
     (said,) = rough({0: arc}, 0.2, "the wires")
     assert said.endswith(f"give a point every {advised}")
+    turned = np.arange(0.0, np.pi, float(advised.split()[0]) / radius)
+    assert rough({0: radius * np.column_stack([np.cos(turned), np.sin(turned), 0.0 * turned])}, 0.2, "the wires") == []
 
 
 @pytest.mark.parametrize("step_mm", [0.5, 2.0, 5.0])

@@ -413,7 +413,12 @@ def test_wires_that_begin_far_beyond_the_clamp_are_told(known: Known, tmp_path: 
         ("/", "coordinates", b"RAS", True),
         ("/", "length_unit", "m", True),
         ("/frames/000/simulated_mm", "unit", np.array(["cm"], h5py.string_dtype()), True),
+        ("/frames/000", "space", "RAS", True),
+        ("/frames", "units", "m", True),
         ("/", "coordinates", "lps", False),
+        ("/", "coordinates", "left-posterior-superior", False),
+        ("/", "coordinates", "", False),
+        ("/", "unit", "N", False),
         ("/", "length_unit", "millimetre", False),
     ],
 )
@@ -435,7 +440,7 @@ def test_what_hdf5_wires_state_is_read(
 def test_a_wire_that_its_file_calls_not_at_rest_has_failed(known: Known, tmp_path: Path) -> None:
     """Without the result of the run beside it, the status in the file was not read: ok."""
     with h5py.File(tmp_path / "wires.h5", "w") as file:
-        for n, status in enumerate(("ok", "max_iterations", "trace_failed", "under_resolved")):
+        for n, status in enumerate(("ok", "MAX_ITERATIONS", "trace_failed", "under_resolved")):
             file[f"frames/{n:03d}/simulated_mm"] = known[1][n]
             file[f"frames/{n:03d}"].attrs["status"] = status
     refused = [file.refused for file in read_wires([Source(tmp_path / "wires.h5")], 4)]

@@ -287,7 +287,7 @@ def test_a_wrong_roll_is_guessed_at() -> None:
     )
     assert "check axes" not in verdict(row | {"null_roll_unknown_rms_mm": 1.9})
     of_another = verdict(row, simulator="floppy")  # "the wire lies nearer" read as if it were the simulator's
-    assert "Wires of wireval, not told the roll, lie nearer (0.820 mm)" in of_another
+    assert "The mean of wireval's wires of all rolls lies nearer (0.820 mm)" in of_another
     said = verdict(row)  # it was said twice, and "That is worse" had lost its noun
     assert said.count("worse") == 1
     assert said.index("The wire is worse (skill -1.00)") < said.index("With an unknown roll")

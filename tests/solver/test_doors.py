@@ -435,10 +435,22 @@ def test_what_is_recommended_for_a_mask_leaves_thick_slices_their_lumen() -> Non
 def test_a_distance_that_is_cut_off_is_warned_of() -> None:
     """Narrow bands: beyond them no wall pushes back, and stiff wires lay 9 mm outside the lumen, at rest."""
     grid = tube_grid()
-    with pytest.warns(UserWarning, match=r"cut off at 0.5 mm outside the lumen.*up to 1 mm and more"):
+    with pytest.warns(UserWarning, match=r"cut off at 0.5 mm outside the lumen.*up to 3 mm"):
         VesselWall(grid.with_values(solver.grid.read_only(np.clip(grid.values, -0.5, 0.5))), 1.0)
-    for most in (1.0, 3.0):
+    # a band that was resampled overshoots
+    finer = ndimage.zoom(np.clip(grid.values, -0.5, 0.5), 1.5, order=3, mode="nearest")
+    with pytest.warns(UserWarning, match="cut off at"):
+        VesselWall(Grid(finer, grid.spacing_mm / 1.5, grid.origin_mm), 1.0)
+    for most in (2.0, 3.0):
         assert not VesselWall(grid.with_values(solver.grid.read_only(np.minimum(grid.values, most))), 1.0).doubts
+
+
+@pytest.mark.parametrize("across", [7, 8])
+def test_a_distance_that_ends_level_at_the_side_of_its_grid_is_whole(across: int) -> None:
+    """Between plates, the outermost layers: they were told to be cut off, and go on beyond the grid."""
+    apart = np.abs(0.25 * (np.arange(across) - 0.5 * (across - 1))) - 0.4
+    plates = np.broadcast_to(apart[None, :, None], (20, across, 40)).copy()
+    assert not VesselWall(Grid(plates, [0.25] * 3, [0.0] * 3), 1.0).doubts
 
 
 def test_what_is_recommended_for_a_mask_is_a_distance() -> None:
@@ -522,6 +534,6 @@ def test_a_wall_in_a_message_is_no_dump_of_its_distances() -> None:
 def test_a_distance_in_mm_is_not_however_thin_the_lumen_or_rough_its_wall(lumen: float, noise: float) -> None:
     grid = tube_grid(lumen=lumen)
     rough = noise * np.random.default_rng(1).normal(size=grid.shape)
-    VesselWall(grid.with_values(solver.grid.read_only(np.clip(grid.values + rough, -1.0, 1.0))), 1.0)
+    VesselWall(grid.with_values(solver.grid.read_only(np.clip(grid.values + rough, -1.0, 3.0))), 1.0)
     flat = Grid(np.full((4, 4, 4), -1.0))
     VesselWall(flat, 1.0)

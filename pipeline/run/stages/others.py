@@ -68,8 +68,8 @@ def frames_of_others(run: Context, known: Known) -> tuple[Frame, ...]:
     wires = {f.index: f.simulated.joints_mm for f in frames if f.simulated is not None}
     voxel_mm = known.vessel.distance.voxel_mm
     log.warnings += _in_another_order(frames)
-    log.warnings += [*_outside(known, wires, case), *_aside(frames, voxel_mm)]
-    late = _begun_late(known, files)
+    log.warnings += [*_outside(known, wires, case), *_aside(frames, _seen_in_mm(known))]
+    late = {n: mm for n, mm in _begun_late(known, files).items() if n in wires}
     log.warnings += _told_late(late)
     log.warnings += rough({n: wires[n][n in late :] for n in wires}, voxel_mm, "the simulated wires")
     log.warnings += _kinked(wires, case.wire)
@@ -176,6 +176,11 @@ def _told_late(late: Mapping[int, float]) -> list[str]:
     ]
 
 
+def _seen_in_mm(known: Known) -> float:
+    """The voxels that the wires are seen in, mm; inf where there are no scans."""
+    return float(known.scans.first.grid.voxel_mm) if known.scans.first is not None else np.inf
+
+
 def _aside(frames: Sequence[Frame], voxel_mm: float) -> list[str]:
     """A warning where all wires lie aside from the traced ones by one and the same shift, and near without it."""
     pairs = [(f.curve.points_mm, f.simulated.joints_mm) for f in frames if f.curve and f.traced and f.simulated]
@@ -186,7 +191,7 @@ def _aside(frames: Sequence[Frame], voxel_mm: float) -> list[str]:
     if size < min(LEAST_ASIDE_MM, LEAST_ASIDE_VOXELS * voxel_mm) or left > MOST_LEFT * size:
         return []
     place = spelt(shift, 2)
-    corner = " (a voxel's corner lies half a voxel from its middle along each axis)" * (size < 2.0 * voxel_mm)
+    corner = " (a voxel's corner lies half a voxel from its middle along each axis)" * (size < 2.0 * voxel_mm < np.inf)
     return [
         f"the wires lie ({place}) mm aside from the traced ones, alike in {counted(len(pairs), 'frame')} (without that "
         f"{left:.2g} mm rms are left): is their origin that of the scans{corner}?"

@@ -37,6 +37,7 @@ LONE, UNSEEN_RADIUS_MM = 0.9, 20.0
 """Share of a curve's length from which a piece is all of it and nothing tells how it bends, and a bend it may have."""
 LEAST_BEND_MM = 0.01
 """By how much a curve that is not straight is longer than its chord: as 5 mm of a wire with a radius of 20 mm."""
+STEPS_MM = (1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01)
 MOST_NAMED = 6
 _LINE = "mm in one line"
 RESAMPLE = "give more; 3D Slicer saves a curve's control points alone: resample it before it is saved"
@@ -120,7 +121,7 @@ def rough(curves: Mapping[int, Array], voxel_mm: float, whose: str, mend: str = 
         said.append(
             f"{whose} have few points{mostly}: straight lines between them pass beside a smooth wire "
             f"({listed(coarse, MOST_NAMED)}; they may pass {allowed_mm:.2f} mm beside it): "
-            f"{mend or f'give a point every {apart_mm:.1g} mm'}"
+            f"{mend or f'give a point every {apart_mm:g} mm'}"
         )
     if longer:
         each = listed([f"frame {n}: {100.0 * share:.1f} %" for n, share in longer.items()], MOST_NAMED)
@@ -147,13 +148,13 @@ def _cut(points_mm: Array, allowed_mm: float) -> str:
 
 
 def _apart_mm(curves: Iterable[Array], allowed_mm: float) -> float:
-    """How far apart the points of these curves may lie: a line passes beside an arc with the square of its length."""
-    found = []
-    for points in curves:
-        longest = float(np.linalg.norm(np.diff(points, axis=0), axis=1).max())
-        off_mm = max(corner_mm(points), longest**2 / (8.0 * UNSEEN_RADIUS_MM))
-        found.append(longest * float(np.sqrt(allowed_mm / off_mm)))
-    return min(1.0, *found)
+    """How far apart points (n, 3) of these curves may lie, 1 mm at most: 0.5, 0.2, 0.1 and so on.
+
+    A line of length h passes h^2 / 8R beside a bend of radius R.
+    """
+    tightest = max(1.0 / UNSEEN_RADIUS_MM, *(float(_bends_per_mm(points).max()) for points in curves))
+    apart = float(np.sqrt(8.0 * allowed_mm / tightest))
+    return next(step for step in STEPS_MM if step <= max(apart, STEPS_MM[-1]))
 
 
 def jagged(points_mm: Array) -> float:
@@ -186,8 +187,13 @@ def zigzag(points_mm: Array) -> float:
 
 def corner_mm(points_mm: Array) -> float:
     """The furthest that a line between two points (n, 3) passes beside an arc with the curve's turns at these, mm."""
-    steps = np.diff(points_mm, axis=0)
-    length = np.linalg.norm(steps, axis=1)
+    length = np.linalg.norm(np.diff(points_mm, axis=0), axis=1)
+    return float(np.max(_bends_per_mm(points_mm) * length**2 / 8.0))
+
+
+def _bends_per_mm(points_mm: Array) -> Array:
+    """Curvature (n - 1,) of a curve (n, 3) from each point to the next, by the turns at both."""
+    length = np.linalg.norm(np.diff(points_mm, axis=0), axis=1)
     bend = np.radians(turns_deg(points_mm, 1)) / (0.5 * (length[1:] + length[:-1]))
     ends = np.concatenate([bend[:1], bend, bend[-1:]]) if len(bend) else np.zeros(2)
-    return float(np.max(0.5 * (ends[1:] + ends[:-1]) * length**2 / 8.0))
+    return np.asarray(0.5 * (ends[1:] + ends[:-1]))
