@@ -32,9 +32,7 @@ def narrow_of_short(statistics: Mapping[str, Any]) -> str:
     if isnan(value_of(statistics.get("rms_low_mm"))) or not good < SHORT * of:
         return ""
     frames = counted(max(1, floor(good / of)), "frame")
-    return (
-        f"A rare frame that is far off is missed by insertions of {frames}: below {SHORT}, intervals may be too narrow."
-    )
+    return f"Insertions of {frames} miss rare ones that are far off: below {SHORT}, intervals may be too narrow."
 
 
 def alone_in(statistics: Mapping[str, Any], skill: float, least: float, most: float) -> str:

@@ -414,8 +414,8 @@ def test_intervals_over_short_insertions_are_said_to_be_too_narrow_perhaps() -> 
     """With one frame in twenty far off, intervals over insertions of 3 to 10 frames hold the true value in 82 to 89 %,
     and only those of 25 frames in 92 %: nothing said so."""
     row = {"rms_mm": 0.25, "rms_low_mm": 0.2, "rms_high_mm": 0.3, "frames": 30, "frames_ok": 30, "insertions": 6}
-    said = "A rare frame that is far off is missed by insertions of 5 frames: below 25, intervals may be too narrow."
+    said = "Insertions of 5 frames miss rare ones that are far off: below 25, intervals may be too narrow."
     assert said in verdict(row)
-    assert "insertions of 24 frames" in verdict(row | {"frames_ok": 749, "insertions": 30}), "it was 25, fewer than 25"
+    assert "Insertions of 24 frames" in verdict(row | {"frames_ok": 749, "insertions": 30}), "it was 25, fewer than 25"
     assert "too narrow" not in verdict(row | {"frames": 150, "frames_ok": 150})
     assert "too narrow" not in verdict(row | {"rms_low_mm": None}), "there is no interval"

@@ -74,8 +74,8 @@ def build(plan: ScenePlan) -> tuple[GuideWire, VesselWall | None]:
     if not plan.wall:
         return wire, None
     with warnings.catch_warnings():
-        # a lumen of a voxel, or of none, is a scene like another
-        warnings.filterwarnings("ignore", "wall: distance: the least value")
+        # a lumen of a voxel, or of none, is a scene like another, and one with walls that end right beyond it
+        warnings.filterwarnings("ignore", "wall: distance: (the least value|it is cut off)")
         if plan.noise_mm > STEEP_NOISE * min(plan.voxel_mm):
             warnings.filterwarnings("ignore", "wall: distance: it changes by")
         return wire, VesselWall(lumen_grid(plan), plan.wall_stiffness, plan.friction, plan.hull)
