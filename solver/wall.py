@@ -104,7 +104,7 @@ def _doubts(values: Array, spacing_mm: Array) -> str:
         return _cut_off(values)
     return (
         f"it changes by {steep:.2g} per mm across the wall, a signed distance in mm by 1; is it in voxels or in "
-        "metres, or a difference of two distance transforms that was not smoothed (gaussian_filter(..., 1)), is the "
+        "metres, or a difference of two distance transforms that was not smoothed (gaussian_filter), is the "
         "spacing right, are the axes x, y, z?"
     )
 

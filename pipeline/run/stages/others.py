@@ -69,7 +69,7 @@ def frames_of_others(run: Context, known: Known) -> tuple[Frame, ...]:
     voxel_mm = known.vessel.distance.voxel_mm
     log.warnings += _in_another_order(frames)
     log.warnings += [*_outside(known, wires, case), *_aside(frames, _seen_in_mm(known))]
-    late = {n: mm for n, mm in _begun_late(known, files).items() if n in wires}
+    late = _begun_late(known, files, wires)
     log.warnings += _told_late(late)
     log.warnings += rough({n: wires[n][n in late :] for n in wires}, voxel_mm, "the simulated wires")
     log.warnings += _kinked(wires, case.wire)
@@ -158,11 +158,12 @@ def _clearance(known: Known, points: Array) -> Array:
     return wall_of(known.vessel.distance, "offset").look_up(resample(points, STEP_MM))[0]
 
 
-def _begun_late(known: Known, files: Sequence[OtherFile]) -> dict[int, float]:
-    """By frame how far beyond the clamp's plane its wire begins, mm, where that is more than LATE_MM."""
+def _begun_late(known: Known, files: Sequence[OtherFile], wires: Mapping[int, Array]) -> dict[int, float]:
+    """By frame, of those with a wire, how far beyond the clamp's plane it begins, mm, where that is over LATE_MM."""
     entry, along = known.held.entry_mm, known.held.direction
-    begins = {n: float((f.points_mm[0] - entry) @ along) for n, f in enumerate(files) if f.points_mm is not None}
-    return {known.frames[n].index: mm for n, mm in begins.items() if mm > LATE_MM}
+    read = {f.index: file.points_mm for f, file in zip(known.frames, files, strict=True)}
+    begins = {n: float((points[0] - entry) @ along) for n in wires if (points := read[n]) is not None}
+    return {n: mm for n, mm in begins.items() if mm > LATE_MM}
 
 
 def _told_late(late: Mapping[int, float]) -> list[str]:
