@@ -76,7 +76,7 @@ docs:
 	$(OUT)/docs/bin/mkdocs build --strict --site-dir $(abspath $(OUT))/site
 
 study: setup
-	$(BIN)/python -m pytest -q -m slow
+	$(BIN)/python -m pytest -q -n auto --maxprocesses 4 --dist loadfile -m slow
 
 # the bars of the full study on seeds that nobody tuned on: one study of 30 frames each, then the table
 SEEDS ?= 101 102 103
@@ -193,7 +193,7 @@ coverage: setup
 # 100 random changes of product lines, each against the tests that execute them: the share that is noticed (hours)
 mutants: setup
 	$(COVERAGE)
-	$(BIN)/python -m tests.studies.mutants --seed $(SEED) --site $(OUT)/coverage -- -n 2 --dist loadfile
+	$(BIN)/python -m tests.studies.mutants --seed $(SEED) --site $(OUT)/coverage -- -n 2 --dist loadfile -m "not peers"
 
 # scans that nobody would scan, every index of compiled code checked: by itself it reads on beyond an array
 bounds: setup

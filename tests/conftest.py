@@ -20,8 +20,19 @@ LONGEST = ("test_run.py", "test_catalogue.py", "test_score.py", "test_documents.
 """One to three minutes each, some in two tests: begun last, every other worker would wait for them."""
 
 
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """The longest files first, then those of most tests; each file in its own order."""
+    """The longest files first, then those of most tests; each file in its own order.
+
+    Of a test that is ``quick(n)`` all sets of parameters but the first n are slow.
+    """
+    met: Counter[str] = Counter()
+    for item in items:
+        test = item.nodeid.partition("[")[0]
+        for quick in item.iter_markers("quick"):
+            if met[test] >= quick.args[0]:
+                item.add_marker(pytest.mark.slow)
+        met[test] += 1
     count = Counter(item.path for item in items)
     place = {name: n for n, name in enumerate(LONGEST)}
     items.sort(key=lambda item: (place.get(item.path.name, len(place)), -count[item.path], item.path))

@@ -42,6 +42,7 @@ def package_in(tmp_path: Path, package: str) -> Path:
     return folder
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("package", ONE)
 def test_an_edited_callee_is_compiled_again(package: str, tmp_path: Path) -> None:
     """The callee stands two files away, and its new text has the length and the time of the old one."""
@@ -62,6 +63,7 @@ def test_an_edited_callee_is_compiled_again(package: str, tmp_path: Path) -> Non
     assert called(tmp_path, package) == "2"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("package", ONE)
 def test_code_without_docstrings_is_kept_beside_that_with_them(package: str, tmp_path: Path) -> None:
     """PYTHONOPTIMIZE=2 and a plain run took each other's files, so that each compiled all anew."""
@@ -102,6 +104,7 @@ def test_two_processes_that_compile_at_one_time_do_not_mix_their_code(package: s
     assert third.load(first) is None, "of a process that began before an edit"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("package", ONE)
 def test_a_part_of_callers_runs_in_them_alone(package: str, tmp_path: Path) -> None:
     """Compiled here or read from the disk it computes, raises with its message, and is refused to Python."""

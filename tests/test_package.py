@@ -26,6 +26,7 @@ def run(words: list[str], what: str) -> str:
     return done.stdout
 
 
+@pytest.mark.slow
 def test_the_wheel_holds_what_the_checkout_has(tmp_path: Path) -> None:
     """That it runs, too, is shown by ``make package``, a minute."""
     if not (ROOT / ".git").exists():

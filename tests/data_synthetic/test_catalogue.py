@@ -82,6 +82,7 @@ def test_files_read_back_identically(study: Study, format_: str, tmp_path: Path)
     np.testing.assert_allclose(truth["frames"][1]["points_mm"], study.truth[1].points_mm, rtol=0.0, atol=1e-6)
 
 
+@pytest.mark.quick(2)
 @pytest.mark.parametrize("format_", FORMATS)
 def test_oblique_anisotropic_geometry_reads_back(study: Study, format_: str, tmp_path: Path) -> None:
     turned = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))[0]
@@ -147,6 +148,7 @@ def test_the_page_of_the_catalogue_is_up_to_date() -> None:
             assert len(set(picture.convert("L").tobytes())) > 20, "not a blank picture"
 
 
+@pytest.mark.quick(2)
 @pytest.mark.parametrize("name", ["helix", "two-wires", "moved-phantom", "anisotropic", "oblique", "stenosis"])
 def test_scene_builds_small_with_a_sound_truth(name: str) -> None:
     study = catalogue.build(name, **SMALL)

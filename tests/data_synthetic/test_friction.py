@@ -90,6 +90,7 @@ def test_without_friction_the_tension_is_the_load(bend: Anatomy) -> None:
         assert tension == pytest.approx(LOAD_N, rel=2e-3)
 
 
+@pytest.mark.slow
 def test_vanishing_friction_is_no_friction(bend: Anatomy) -> None:
     plain = TrueInsertion(TrueWire(), bend, 2.0, np.array([0, 0, -8.0]), Z, X, 0.4, 0.4)
     without, with_little = (next(iter(replay(replace(plain, friction=mu), [24.0]))).points_mm for mu in (0.0, 1e-7))

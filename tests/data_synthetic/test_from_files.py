@@ -144,6 +144,7 @@ def test_a_smooth_centreline_is_painted_where_the_file_has_it(jitter_mm: float, 
     assert least < np.max(in_file.query(way)[0]) < most
 
 
+@pytest.mark.slow
 def test_scene_from_a_tree_builds(tmp_path: Path) -> None:
     write_swc(tmp_path / "tree.swc")
     study = build(from_anatomy(tmp_path / "tree.swc"), frames=2, size=40, truth_step_mm=0.8)
@@ -188,6 +189,7 @@ def test_wire_painted_into_a_scan_lies_in_its_vessel(tmp_path: Path) -> None:
     assert np.all(study.reference[tuple(index.T)] > 250)  # vessel is at 1000, its wall at 500, less where pressed
 
 
+@pytest.mark.slow
 def test_a_vessel_is_found_beside_bone_and_above_tissue() -> None:
     """Hounsfield units: the brightest voxels are a skull's, and air is darker than what surrounds the vessel."""
     grid = centred_grid([0, 0, 10], (80, 80, 100), 0.5)
@@ -204,6 +206,7 @@ def test_a_vessel_is_found_beside_bone_and_above_tissue() -> None:
     assert find_way(found.voxels, grid).length_mm > 25
 
 
+@pytest.mark.slow
 def test_a_vessel_is_painted_into_a_scan_that_shows_none(tmp_path: Path) -> None:
     """In voxels that are not cubes, beside something bright that is no tube."""
     rng = np.random.default_rng(2)

@@ -57,6 +57,7 @@ def test_the_smallest_size_is_named_and_allowed(name: str) -> None:
     assert len(Wanted(size=smallest - 1).problems(scene)) == 1
 
 
+@pytest.mark.quick(6)
 @pytest.mark.parametrize("name", catalogue.names())
 def test_natural_sizes_and_those_of_the_golden_tables_are_allowed(name: str) -> None:
     scene = catalogue.describe(name)

@@ -15,6 +15,7 @@ def build(seed: int = 0, **plan: object) -> Anatomy:
     return circle_of_willis(np.random.default_rng(seed), WillisPlan(**plan))  # type: ignore[arg-type]
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize(("spread", "share"), [(0.5, 0.48), (1.0, 0.72)])
 def test_sizes_are_drawn_from_the_published_means_and_spreads(spread: float, share: float) -> None:
     """A normal draw cut at one sd keeps 0.48 of the sd where half of it is drawn, 0.72 where all of it is."""

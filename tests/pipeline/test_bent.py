@@ -118,6 +118,7 @@ def test_a_phantom_that_is_rigid_is_silent(phantom: tuple[int, Lumen, Anchor], v
     assert across(found.motion.moved(line(seed)) - true.moved(line(seed)), line(seed)).max() < 0.1 * VOXEL
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "ends", [pytest.param((0.7, 1.4)), *(pytest.param(e, marks=pytest.mark.slow) for e in ((0.8, 1.25), (1.25, 0.8)))]
 )
@@ -132,6 +133,7 @@ def test_a_gain_that_varies_over_the_scan_is_no_motion(
     assert not warnings_of(found, lumen, to)
 
 
+@pytest.mark.slow
 def test_a_motion_is_found_beside_a_gain_that_varies(phantom: tuple[int, Lumen, Anchor]) -> None:
     """It was 0.2 to 0.5 voxel off."""
     seed, _, to = phantom

@@ -39,6 +39,7 @@ def told(reference: Volume, frame: Volume) -> list[str]:
     return [said for said in sentences_of(alignment, {1: found})[1] if "beside the lumen" in said]
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize(
     ("radius", "vessel", "voxels", "gain"), [(0.7, 400.0, 0.0, 1.2), (0.9, -400.0, 0.0, 1.0), (1.2, 400.0, 3.0, 0.8)]
 )
@@ -50,6 +51,7 @@ def test_a_branch_that_only_the_frame_shows_is_told(radius: float, vessel: float
     assert np.linalg.norm(mouth - place, axis=1).min() < 1.5
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize(("shown", "radius"), [(0.0, 0.0), (1.2, 1.2), (1.2, 0.0)])
 def test_what_the_reference_shows_too_is_not_told(shown: float, radius: float) -> None:
     assert not told(scan(0, shown), scan(1, radius, gain=1.1))
@@ -61,6 +63,7 @@ def test_a_wire_that_leaves_the_lumen_is_no_branch() -> None:
     assert not told(scan(0, 0.0), Volume(out.astype(np.int16), frame.spacing_mm, frame.origin_mm))
 
 
+@pytest.mark.quick(2)
 @pytest.mark.parametrize("shift", [-0.5, -0.4, 0.5, 1.5])
 def test_bone_beside_the_vessel_is_no_branch_where_the_phantom_moved(shift: float) -> None:
     """Once 9 cells: at the next voxel its edge is half a voxel off, a third of a step of four times the contrast."""

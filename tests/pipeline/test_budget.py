@@ -313,6 +313,7 @@ def spread_ends(rng: np.random.Generator, members: int = 48, frames: int = 4) ->
     return (rng.normal(size=(members + 1, frames * 8)) @ root.T).reshape(members + 1, frames, 8)
 
 
+@pytest.mark.slow
 def test_ranks_of_right_insertions_are_even() -> None:
     """Of 400 right ones 20 are expected to be claimed; 3 standard deviations are 13."""
     rng = np.random.default_rng(5)
@@ -442,6 +443,7 @@ def test_the_budget_moves_nothing_and_a_sweep_pays_for_none(out: Path) -> None:
     assert not (paths[2] / "entries.csv").exists()
 
 
+@pytest.mark.slow
 def test_an_ensemble_that_is_too_small_says_so(study: Path, tmp_path: Path) -> None:
     words = ["-o", str(tmp_path), "--until", "compare", "--set", "budget.members=4", "--set", "budget.members_alone=2"]
     assert main(["run", str(study / "manifest.toml"), *words, "--set", "compare.simulated_nulls=false"]) == 0

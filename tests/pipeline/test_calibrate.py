@@ -103,6 +103,7 @@ def test_parameters_are_found_again_and_the_clamp_with_them():
     assert {frame.turned for frame in fit.frames} == {""}, "its roll is exact"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("stated_deg", "apart"), [pytest.param(0.0, False, marks=pytest.mark.slow), (-12.0, True)])
 def test_rolls_that_are_stated_wrongly_have_no_common_offset(stated_deg, apart):
     """Of two insertions, one stated 11 degrees off, the mean was taken: 5 degrees wrong for both, +- 0.7, seen."""
@@ -121,6 +122,7 @@ def test_rolls_that_are_stated_wrongly_have_no_common_offset(stated_deg, apart):
     assert bool(no_common_roll(found)) is apart, "it stood in the parameter's row alone"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("off_deg", [9.0, pytest.param(20.0, marks=pytest.mark.slow)])
 def test_rolls_that_are_stated_a_little_wrongly_are_no_taper(off_deg):
     """Rolls stated 5 to 20 degrees wrong, each otherwise: the taper was 0.76 to 1.5, seen, up to 6.5 sd off."""
@@ -273,6 +275,7 @@ def test_a_straight_wire_is_followed_from_one_roll_however_it_is_stated():
         assert len(fitted(all_of(one), [Evidence(one)], SETTINGS).starts) == 1
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize("times", [8.0, 12.0])
 def test_what_the_traces_contradict_does_not_stay_as_stated(monkeypatch, times):
     """A shaft stated three times too stiff stayed so, "not seen", and bent the rest curvature by 3.2 of its sd."""

@@ -422,6 +422,7 @@ def test_the_package_runs_and_completes(tmp_path: Path) -> None:
         assert found.stdout.strip() == "study", words
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("closed", ["stdout", pytest.param("stderr", marks=pytest.mark.slow)])
 def test_a_reader_that_has_gone_does_not_change_the_exit_code(study: Path, tmp_path: Path, closed: str) -> None:
     """A gate in a pipe, ``wireval run | head -1``, said that all was well; and the verb has to finish."""
@@ -791,6 +792,7 @@ def test_a_terminal_that_knows_no_umlaut_gets_it_spelt_out() -> None:
     assert raw.getvalue() == rb"report: Gef\xe4\xdf/index.html"
 
 
+@pytest.mark.slow
 def test_a_closed_output_is_no_trouble() -> None:
     done = subprocess.run(
         f"{sys.executable} -m pipeline settings >&-", shell=True, stderr=subprocess.PIPE, text=True, check=False

@@ -44,6 +44,7 @@ def scans() -> tuple[Volume, Volume, object]:
     return frames[0].frame, frames[1].frame, anchor(frames[0].frame, lumen)
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize("voxels", [1.0, 4.0])
 def test_a_phantom_that_moved_is_named_as_what_a_frame_is_refused_for(scans, voxels: float) -> None:
     _, later, first = scans
@@ -73,6 +74,7 @@ def test_a_phantom_that_lay_still_is_not_blamed(scans, status: FrameStatus) -> N
     assert of_drift({0: seen(status)}) == []
 
 
+@pytest.mark.slow
 def test_where_nobody_sees_whether_it_moved_both_are_named(scans) -> None:
     _, later, first = scans
     grey = np.random.default_rng(0).normal(500.0, 30.0, later.shape).astype(np.float32)
@@ -91,6 +93,7 @@ def write(scan: Volume, path: Path) -> None:
     sitk.WriteImage(image, str(path))
 
 
+@pytest.mark.slow
 def test_a_phantom_that_moved_is_told_where_registration_is_switched_off(tmp_path: Path) -> None:
     """Of one that moved by 0.9 voxel traces were ok, with a tenth of that for their standard deviation."""
     draft = Draft(np.random.default_rng(3), length=14.0, spacing=0.4)

@@ -77,6 +77,7 @@ def test_exchanged_wires_go_round_in_a_ring() -> None:
     assert ring({"a": "b", "b": "c"}) == set(), "the wires of c are its own"
 
 
+@pytest.mark.quick(2)
 @pytest.mark.parametrize("seed", [*range(4), *later(*range(4, 20))])
 def test_one_wire_for_all_is_a_poor_simulator_and_no_exchange(seed: int) -> None:
     """A simulator that knows no roll fits the insertion that lies as it says: in 67 % of ten somebody was accused."""

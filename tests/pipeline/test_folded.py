@@ -24,6 +24,7 @@ def folded(seed: int, length_mm: float, beside_mm: float) -> Scene:
     return draft.scan(12)
 
 
+@pytest.mark.quick(2)
 @pytest.mark.parametrize(
     ("seed", "length_mm", "beside_mm"), [(0, 2.0, 0.65), (1, 2.0, 0.65), (2, 2.0, 0.75), (1, 3.0, 0.65)]
 )

@@ -33,6 +33,7 @@ def facing(gap_mm: float):
     return draft.scan(16)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("gap_mm", [1.2, *later(2.5)])
 def test_a_device_that_faces_the_tip_is_not_taken_for_the_wire_unless_the_depth_says_so(gap_mm):
     scene = facing(gap_mm)

@@ -112,6 +112,7 @@ def test_what_only_a_helper_met_is_told_and_an_error_that_comes_again_speaks_for
     assert len(told) == 1
 
 
+@pytest.mark.slow
 def test_what_kept_helpers_from_helping_stands_in_the_log(
     study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -288,6 +289,7 @@ def test_a_process_that_hashes_may_die_or_fail(tmp_path: Path, monkeypatch: pyte
     assert multiprocessing.active_children() == []
 
 
+@pytest.mark.slow
 def test_a_frame_that_asked_is_traced_again_where_the_frame_before_is_another(
     study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -311,6 +313,7 @@ def test_a_frame_that_asked_is_traced_again_where_the_frame_before_is_another(
     assert run(other, tmp_path / "other", "-j", "2", "--until", "trace") == {"segment": 1, "trace": FRAMES - 2}
 
 
+@pytest.mark.slow
 def test_the_fit_of_the_clamp_has_a_time_of_its_own(
     study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -347,6 +350,7 @@ def test_a_limit_of_memory_is_that_of_one_process_and_a_cluster_has_cores_of_its
     assert cores_each(limited, 1) == cores_each(remote, 1) == 1
 
 
+@pytest.mark.slow
 def test_the_command_takes_no_threads_beside_those_of_j() -> None:
     """With two threads of BLAS, -j 1 and -j 2 differed in the last digit."""
     code = "import os, pipeline; from pipeline.cli import main; main(); print(*map(os.environ.get, pipeline.THREADS))"

@@ -32,6 +32,7 @@ def hooked(radius: float, seed: int, cnr: float) -> tuple[Volume, Volume, np.nda
     return frame, still, path[240:], plane[:, 0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("radius", "most"), [(0.8, 0.45), *later((1.3, 0.2))])
 def test_the_tip_of_a_hook_is_not_drawn_outwards(radius: float, most: float) -> None:
     """0.57 and 0.38 voxel, 4 to 7 times the stated sigma, always outwards, and ok."""

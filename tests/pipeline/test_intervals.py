@@ -39,6 +39,7 @@ def test_the_intervals_hold_the_true_value_as_often_as_they_say(condition: Condi
         assert 0.92 <= share <= 0.98
 
 
+@pytest.mark.quick(2)
 @pytest.mark.parametrize(
     "condition", [c for c in CONDITIONS if c.lag == 0.8 and c.insertions < 20 and c.outliers], ids=str
 )

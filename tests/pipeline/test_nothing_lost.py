@@ -87,6 +87,7 @@ def test_a_run_that_ended_before_its_pages_gets_them(study: Path, whole: Path, o
     assert differences(whole, out) == []
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize(("name", "how"), [("errors.csv", "altered"), ("view/lumen.vtp", "gone")])
 def test_what_is_not_as_it_was_written_is_computed_again(
     study: Path, whole: Path, out: Path, name: str, how: str, capsys: pytest.CaptureFixture[str]
@@ -129,6 +130,7 @@ def test_a_page_stays_where_what_it_is_drawn_from_is_not_whole(
     assert list(pd.read_csv(out / "summary.csv")["status"]) == ["damaged"]
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize("how", ["gone", "half"])
 def test_tables_without_their_ledger_are_not_believed(
     study: Path, whole: Path, out: Path, how: str, capsys: pytest.CaptureFixture[str]
@@ -169,6 +171,7 @@ def healed(study: Path, whole: Path, out: Path, said: str, capsys: pytest.Captur
     assert differences(whole, out) == []
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize("lost", [(), ("errors.csv",), ("points.csv.gz",)])
 def test_a_ledger_that_names_too_few_files_is_not_believed(
     study: Path, whole: Path, out: Path, lost: tuple[str, ...], capsys: pytest.CaptureFixture[str]
@@ -207,6 +210,7 @@ def test_a_case_that_was_to_end_early_is_whole_with_fewer_files(study: Path, tmp
     assert (case_of(tmp_path) / "result.json").stat().st_mtime_ns == before
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize("name", ["errors.csv", "view/scene.mrml"])
 def test_a_pipe_that_the_ledger_calls_empty_does_not_block(
     study: Path, whole: Path, out: Path, name: str, capsys: pytest.CaptureFixture[str]
@@ -221,6 +225,7 @@ def test_a_pipe_that_the_ledger_calls_empty_does_not_block(
     assert differences(whole, out) == []
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize(
     ("change", "said"),
     [
@@ -304,6 +309,7 @@ def test_a_record_of_a_run_that_is_none_is_named(
     assert "run.json is damaged; say --resume" in capsys.readouterr().err
 
 
+@pytest.mark.quick(8)
 @pytest.mark.parametrize("name", ["result.json", "ledger.json", "errors.csv", "frames.h5"])
 @pytest.mark.parametrize("how", SPOILT)
 def test_a_file_of_a_case_that_is_none_is_named(
@@ -525,6 +531,7 @@ def test_an_output_that_cannot_be_written_is_named_before_anything_is_run(
     assert "cannot be written: Not a directory; name a place where you may write" in said
 
 
+@pytest.mark.slow
 def test_a_store_that_cannot_be_written_costs_a_warning(
     study: Path, whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -632,6 +639,7 @@ sys.exit(main(["synth", "straight", "-o", sys.argv[2], "--size", "72", "--insert
 """
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_a_signal_that_comes_while_python_forks_is_not_lost(tmp_path: Path, number: signal.Signals, code: int) -> None:
     """Python prints the exception of a signal that it handles there, and goes on: the study was made to its end."""
@@ -716,6 +724,7 @@ def changing(monkeypatch: pytest.MonkeyPatch, stage: str, change: Callable[[], o
     monkeypatch.setitem(STEPS, stage, changed)
 
 
+@pytest.mark.quick(2)
 @pytest.mark.parametrize(
     ("stage", "how"),
     [

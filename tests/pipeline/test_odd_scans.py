@@ -26,6 +26,7 @@ assert np.isnan(wall.distance[0])
 """
 
 
+@pytest.mark.slow
 def test_between_thick_slices_a_foot_is_not_looked_for_beyond_the_box() -> None:
     """Two slices are twenty voxels across them, and the box is padded by four: other memory was read as grey."""
     env = os.environ | {"NUMBA_DISABLE_JIT": "1"}  # compiled code checks no index
@@ -33,6 +34,7 @@ def test_between_thick_slices_a_foot_is_not_looked_for_beyond_the_box() -> None:
     assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize(
     "seed",
     [

@@ -157,6 +157,7 @@ def test_a_part_of_the_cases_is_not_run_with_other_settings(
     assert run(study, out, *FINE, "--resume") != 2, "all of them"
 
 
+@pytest.mark.slow
 def test_shards_of_different_settings_are_not_pooled(
     study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -180,6 +181,7 @@ def test_shards_of_different_settings_are_not_pooled(
     assert len(pd.read_csv(out / "overall.csv")) == 1
 
 
+@pytest.mark.slow
 def test_shards_of_arrays_of_other_sizes_are_not_pooled(study: Path, tmp_path: Path) -> None:
     """A case of the earlier array lay on top of the later one's, with the error of a scan that had been replaced."""
     out = tmp_path / "out"
@@ -388,6 +390,7 @@ def test_tables_of_one_shard_are_not_those_of_all(study: Path, tmp_path: Path) -
         assert not wireval.read_results(out).ok, "none is no number, and was a traceback"
 
 
+@pytest.mark.slow
 def test_what_is_doubtful_among_cases_of_several_shards_is_found_by_report(
     study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -405,6 +408,7 @@ def test_what_is_doubtful_among_cases_of_several_shards_is_found_by_report(
     assert int(pd.read_csv(out / "overall.csv")["warnings"].item()) == apart + len(doubted(out))
 
 
+@pytest.mark.slow
 def test_what_a_shard_saw_among_its_cases_alone_is_not_said_of_all(
     study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -98,6 +98,7 @@ def test_a_curve_that_zigzags_has_failed(tmp_path: Path) -> None:
     assert "it zigzags, as from voxel to voxel" in failures["message"].iloc[-1]
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize("stated", [None, 0.0, 0.03])
 def test_how_well_own_curves_are_known_can_be_stated(tmp_path: Path, stated: float | None) -> None:
     """The budget took them for 0.15 voxel whatever they were; 0 made the clamp's equations singular."""
@@ -135,6 +136,7 @@ def test_own_curves_need_no_wire_in_their_scans(tmp_path: Path) -> None:
     assert [frame["status"] for frame in result["frames"]] == ["ok"] * len(WIRES)
 
 
+@pytest.mark.slow
 def test_a_curve_of_few_points_is_warned_of(tmp_path: Path) -> None:
     """As 3D Slicer saves control points, which it shows as a spline: straight lines pass 0.2 mm beside it."""
     sparse = [resample(wire, 8.0) for wire in WIRES]
@@ -262,6 +264,7 @@ def test_one_insertion_in_two_files_counts_once(tmp_path: Path, capsys: pytest.C
     assert pd.read_csv(tmp_path / "out" / "overall.csv")["insertions"].tolist() == [1]
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize(("shorter_mm", "group"), [(0.0, ""), (0.4, 'group = "A"\n'), *later((0.4, ""))])
 def test_a_clamp_of_the_same_curves_is_not_called_blind(tmp_path: Path, shorter_mm: float, group: str) -> None:
     """Nor that of other frames of the same insertion."""
@@ -292,6 +295,7 @@ def test_a_wire_straight_at_rest_has_no_rival_that_is_itself(tmp_path: Path) -> 
     assert not set(errors["strongest_null"].dropna()) & {"no_tip_curve", "roll_unknown"}
 
 
+@pytest.mark.slow
 def test_score_says_what_the_curves_are_doubted_for(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Its warnings stood on the pages of the cases alone."""
     manifest = write_study(tmp_path)

@@ -97,6 +97,7 @@ def test_the_row_over_all_rests_on_the_insertions(out: Path) -> None:
     assert pd.read_csv(out / "summary.csv")["rms_low_mm"].isna().all(), "a case is one insertion"
 
 
+@pytest.mark.quick(2)
 @pytest.mark.parametrize(
     ("stated", "wrong", "said"),
     [
@@ -197,6 +198,7 @@ def test_another_insertion_counts_from_where_the_simulated_wire_does(out: Path, 
             assert points[0] > points[1]
 
 
+@pytest.mark.slow
 def test_a_point_of_a_sweep_that_is_missing_or_of_other_inputs_is_told(
     out: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

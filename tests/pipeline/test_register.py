@@ -67,6 +67,7 @@ def off_by(found: Motion, true: Motion, points: np.ndarray) -> float:
     return float(np.linalg.norm(found.moved(points) - true.moved(points), axis=1).max()) / VOXEL
 
 
+@pytest.mark.quick(2)
 @pytest.mark.parametrize(("voxels", "degrees"), [(0.3, 0.0), (1.0, 0.3), (3.0, 1.0), (7.0, 2.0)])
 def test_a_known_motion_is_found(study: Study, fixed: Anchor, voxels: float, degrees: float) -> None:
     true = a_motion(fixed.wall.centre_mm, voxels, degrees, seed=int(10 * voxels) + 100)
@@ -104,6 +105,7 @@ def test_contrast_that_drifts_is_no_motion(study: Study, fixed: Anchor) -> None:
     assert not register(fainter, fixed, SKIP).applied
 
 
+@pytest.mark.quick(2)
 @pytest.mark.parametrize("voxels", [0.0, 0.7])
 @pytest.mark.parametrize("of_gain", [False, True])
 @pytest.mark.parametrize("axis", [0, 1, 2])
@@ -136,6 +138,7 @@ def changed(scan: Volume, scale: float, rim: float | None) -> Volume:
     return replace(scan, values=values.astype(np.float32))
 
 
+@pytest.mark.quick(2)
 @pytest.mark.parametrize(("scale", "rim"), [(1.0, 0.7), (1.0, 0.85), (100.0, None), (1e4, None), (1e-7, None)])
 def test_neither_padding_nor_the_unit_of_grey_moves_a_phantom(
     study: Study, lumen: Lumen, scale: float, rim: float | None
@@ -203,6 +206,7 @@ def test_what_noise_makes_of_a_misfit_is_known(study: Study, lumen: Lumen, sd: f
         assert look(frame, to.wall, Motion())[0].misfit_voxels == pytest.approx(noise, rel=0.25)
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize(("of_reference", "of_frame"), [(1000.0, 1000.0), (0.0, 1500.0)])
 def test_walls_that_noise_hides_are_not_said_to_be_elsewhere(
     study: Study, lumen: Lumen, of_reference: float, of_frame: float
@@ -275,6 +279,7 @@ def test_a_tube_without_ends_does_not_show_that_it_slid() -> None:
         assert found.moved_voxels < 0.05
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize(("radius", "noise", "voxels"), [(0.9, 0.33, 0.5), (1.5, 0.5, 1.0), (1.5, 0.5, 0.4)])
 def test_a_straight_tube_that_moved_is_no_grey_that_slopes(radius: float, noise: float, voxels: float) -> None:
     """With slopes it may as well have stayed where it was: it was said to, and traced a voxel off."""
@@ -314,6 +319,7 @@ def test_frames_of_a_straight_tube_that_rest_share_one_sentence() -> None:
     assert (texts[1:], warnings) == ([HIDES], [])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, *(pytest.param(n, marks=pytest.mark.slow) for n in (1, 2))])
 def test_a_vessel_that_slid_along_itself_is_found_or_said_to_be_loose(seed: int) -> None:
     """Gently curved, and alone in its scans: least squares stopped 0.4 to 1.9 mm short, "0.00 voxel left"."""
@@ -342,6 +348,7 @@ def test_a_vessel_that_slid_along_itself_is_found_or_said_to_be_loose(seed: int)
     assert ("along, or about, itself" in found.sentence) == (found.loose_mm > 0.5)
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize(("waves_voxels", "least", "most"), [(0.0, 5.9, 6.1), (5.0, 0.0, 0.1)])
 def test_a_place_that_slides_back_is_no_other_place(waves_voxels: float, least: float, most: float) -> None:
     """Places were told from where they started: curved vessels that lay right to 0.02 voxel, as 1 to 5 mm off.

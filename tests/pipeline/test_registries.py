@@ -48,6 +48,7 @@ def test_a_metric_that_raises_is_named() -> None:
         metrics.measured("near_share", lambda _: 1 / 0, None)  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 def test_results_of_own_functions_are_not_kept(as_before: None, tmp_path: Path) -> None:
     """What they close over, a partial's values and the modules that they call may have changed unseen."""
     folder = write_run(tmp_path, (FakeCase("tube"),)) / "cases" / "tube"

@@ -232,6 +232,7 @@ def test_a_sweep_moves_the_result_and_traces_once(
     assert f'tests="{FRAMES}" failures="0"' in (tmp_path / "junit.xml").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_a_sweep_of_other_settings_is_not_shown_beside_a_new_result(
     short: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -293,6 +294,7 @@ def test_what_is_doubtful_in_a_manifest_is_said_by_the_run_itself(
         assert said in (out / "index.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_a_bend_too_sharp_to_be_five_times_as_sharp_is_compared(study: Path, tmp_path: Path) -> None:
     """The case crashed: "got 1.6", which nobody had stated."""
     new = "rest_curvature_per_mm = [[0.0, 0.32], [8.0, 0.32], [8.0, 0.0]]"
@@ -340,6 +342,7 @@ def reused_traces(out: Path) -> float:
     return float(json.loads(text)["reused"].get("trace", 0))
 
 
+@pytest.mark.slow
 def test_an_edited_lumen_gives_new_traces(study: Path, finished: Path, tmp_path: Path) -> None:
     """Curves are traced inside the lumen: those of another lumen must not come back, nor what it was refused for."""
     like = sitk.ReadImage(str(finished / "cases" / "bifurcation" / "view" / "lumen.seg.nrrd"))
@@ -363,6 +366,7 @@ def test_a_finished_case_gets_the_page_that_is_asked_for(study: Path, out: Path)
     assert 'src="figures/' not in page.read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_every_pooled_number_is_of_the_frames_that_are_ok(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -547,6 +551,7 @@ def two_cases(study: Path, folder: Path, broken: bool = False) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_the_same_scans_count_once(short: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     both = two_cases(short, tmp_path / "study")
     assert main(["check", str(both)]) == 0
@@ -571,6 +576,7 @@ def test_the_same_scans_count_once(short: Path, tmp_path: Path, capsys: pytest.C
     assert "its frame counts twice" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_a_frame_under_two_names_counts_once(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A copy is refused at the door; the same voxels in another file are told when they are read."""
     out = tmp_path / "out"
@@ -595,6 +601,7 @@ def test_a_frame_under_two_names_counts_once(folder: Path, tmp_path: Path, capsy
     assert pd.read_csv(out / "overall.csv")["frames_ok"].item() == FRAMES
 
 
+@pytest.mark.slow
 def test_the_same_voxels_in_other_files_are_one_insertion(
     short: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -50,6 +50,7 @@ def smoothed(rough: np.ndarray, near: np.ndarray, variance: float) -> np.ndarray
     return out
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize("variance", [0.01, 0.5, 5.0])
 def test_the_residual_is_smoothed_near_the_lumen_alone(variance: float) -> None:
     rng = np.random.default_rng(8)

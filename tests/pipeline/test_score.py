@@ -182,6 +182,7 @@ def test_any_simulator_s_failure_is_the_exit_code(known: Known, tmp_path: Path) 
     assert (out / table["log"].item()).exists()
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("undrawn")
 def test_a_case_without_a_folder_has_failed_and_the_others_count(
     known: Known, tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -210,6 +211,7 @@ def test_a_case_without_a_folder_has_failed_and_the_others_count(
     assert "found neither bend/ nor bend.h5 in it" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("undrawn")
 def test_wires_may_be_judged_alone(known: Known, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The solver's own were simulated with every score, by far the longest part of it where a lumen is kept."""
@@ -490,6 +492,7 @@ def test_a_folded_wire_passes_no_gate_of_warnings(known: Known, tmp_path: Path) 
     assert overall["warnings"] == len(said) + len(remarks(overall))
 
 
+@pytest.mark.slow
 def test_another_simulators_wires_have_no_budget_of_ours(known: Known, tmp_path: Path) -> None:
     """What they are off was counted as what inputs do: of a wire turned by 3 degrees nothing was beyond 2 u."""
     folder = write_csv(tmp_path / "wires", known[1])
@@ -765,6 +768,7 @@ def test_a_place_that_was_typed_is_no_string_of_a_manifest(
     assert list(errors_of(Path("out"))["status"]) == ["ok"] * FRAMES
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("undrawn")
 def test_a_score_of_others_is_not_replaced(known: Known, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The same command with another --curves put its results in the place of the first ones."""

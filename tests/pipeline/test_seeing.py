@@ -53,12 +53,14 @@ def looked_at(case, seed):
     return row_of(case, seed, *made)
 
 
+@pytest.mark.quick(6)
 @pytest.mark.parametrize(("case", "seed"), further_ones_slow(TRACED))
 def test_what_can_be_seen_is_traced(case, seed):
     row = looked_at(case, seed)
     assert row.verdict == "right", row.text
 
 
+@pytest.mark.quick(6)
 @pytest.mark.parametrize(("case", "seed", "status"), further_ones_slow(REFUSED))
 def test_what_cannot_be_told_is_refused(case, seed, status):
     row = looked_at(case, seed)
@@ -80,6 +82,7 @@ def test_a_marker_at_the_tip_is_seen_in_noise_beyond_what_is_not(seed: int, cnr:
     assert ("beyond a gap" if right else "beyond") in curve.note
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize("other", [True, False])
 def test_a_reference_of_another_phantom_is_named(other: bool):
     """It was 500 grey of noise, where there were 60, and the advice to look at the entry."""
@@ -99,6 +102,7 @@ def test_a_stated_depth_does_not_hide_that_the_direction_is_turned_round():
     assert "state insertion_mm" not in row.text
 
 
+@pytest.mark.slow
 def test_a_dim_end_may_be_a_catheters_unless_the_depth_is_stated():
     case, seed = "dim distal part, x 0.15 to 0.2", 518
     assert "state the wire's opacity if its end is so" in look(case, seed).text
@@ -148,12 +152,14 @@ def test_without_its_reference_a_frame_is_not_believed_alone():
     assert look("correlated noise, CNR 4 to 6", 305).verdict == "refused"
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize("case", ["layered filling", "contrast that decays by 60 %"])
 def test_the_wall_lies_half_way_to_the_local_level(case):
     row = look(case, 0)
     assert row.wall < 0.2, "voxel; 0.9 to 1.9 with one level for the whole vessel"
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize(("voxels", "pitch_mm"), [(1.25, 8.0), (2.0, 12.0), (1.3, 3.0), *later((1.5, 6.0), (1.3, 4.0))])
 def test_two_wires_turned_about_each_other_are_not_one(voxels, pitch_mm):
     """Traced midway, ok, 0.6 to 1.1 voxel off at a claimed 0.06 to 0.2: which way they lie apart was averaged away."""
@@ -192,6 +198,7 @@ def test_a_scanner_that_is_sharper_across_its_axis_makes_no_pair_of_one_wire(rat
         assert "out of round" not in curve.note
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize(("seed", "ratio"), [(500, 1.3), (505, 1.3), *later((502, 1.3), (507, 1.4), (506, 1.4))])
 def test_how_sharp_a_scanner_is_along_each_axis_is_read_off_the_wall(seed, ratio):
     """11 of 12 frames of a cone-beam scanner, as much sharper along one axis, were refused as two wires in contact."""
@@ -200,6 +207,7 @@ def test_how_sharp_a_scanner_is_along_each_axis_is_read_off_the_wall(seed, ratio
     assert curve.status is FrameStatus.OK, curve.note
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize(("seed", "ratio"), [(500, 1.4), (504, 1.3), *later((508, 1.3), (501, 1.4), (513, 1.35))])
 def test_what_the_scanner_makes_of_a_wire_hides_no_second_one(seed, ratio):
     scene = scene_of("two wires that touch all along", seed)
@@ -239,6 +247,7 @@ def test_a_wire_that_leaves_the_lumen_is_no_thin_vessel_of_a_frame_without_refer
     assert "leads on through tissue" in curve.note
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize(("seed", "thinner", "about_mm"), [(4, 0.9, 2.0), (1, 0.6, 2.0), (0, 0.0, 2.0)])
 def test_a_tip_in_medium_that_is_washed_out_is_not_seen(seed, thinner, about_mm):
     """As dark as the reference's medium, it was cut off: 3 to 5 voxels short, ok, at a sigma of 0.2 voxel."""
@@ -265,6 +274,7 @@ def test_scans_in_coarse_steps_of_grey_are_no_copies(step):
     assert "to the last bit" not in curve.note
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize(("seed", "lower"), [(0, 100), (1, 200)])
 def test_scans_whose_negative_grey_is_cut_off_at_0_are_no_copies(seed, lower):
     """Half of tissue about 0 is 0 in both: all were refused as copies, and the medium's level was off by a sixth."""
@@ -277,6 +287,7 @@ def test_scans_whose_negative_grey_is_cut_off_at_0_are_no_copies(seed, lower):
     assert curve.levels["gain"] == 1.0
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize("seed", [1, 4, 2])
 def test_a_frame_of_which_a_part_is_the_reference_is_no_scan_of_the_wire(seed):
     """The wire was cut where the copy began, by half of it, ok; a whole frame is as before."""
@@ -295,6 +306,7 @@ def test_a_frame_of_which_a_part_is_the_reference_is_no_scan_of_the_wire(seed):
     assert ("of the lumen's voxels as the reference has them, to the last bit" in curve.note) == (seed != 2)
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize("noises", [-10.0, 0.5, *later(-0.5)])
 def test_grey_that_is_counted_from_elsewhere_costs_no_wire(noises):
     """A reference without its intercept, or of a scanner that is not calibrated: half a noise lost every second."""
@@ -324,6 +336,7 @@ def fitted_in(scene):
     return image, explain.best_of(image, entry, None, TraceConfig())
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize("seed", [30, 32])
 def test_a_wire_in_a_narrow_vessel_is_no_more_contrast(seed):
     """It was 2 and 4 % more, of a vessel that it nearly fills, and a faint end of 8 mm was taken off with that."""
@@ -334,6 +347,7 @@ def test_a_wire_in_a_narrow_vessel_is_no_more_contrast(seed):
     assert curve.status is FrameStatus.TRACE_AMBIGUOUS
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize("gain", [0.75, 1.0, 1.3])
 @pytest.mark.parametrize("seed", [4, *later(6)])
 def test_the_wire_is_not_taken_for_contrast_medium(seed, gain):
@@ -444,6 +458,7 @@ def test_faint_wire_beyond_a_tip_stands_out_over_its_length_and_noise_does_not()
         assert highest(wire, 3.0) == 0.0, "none is as bright as that"
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize(("share", "cnr"), [(0.03, 120), (0.07, 40), (0.0, 120)])
 def test_an_end_as_faint_as_a_streak_is_told_of(share, cnr):
     """The last 6 mm had 3 to 7 % of the brightness: cut off in 18 of 18 frames, ok, without a word."""

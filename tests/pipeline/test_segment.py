@@ -43,6 +43,7 @@ def wall_error(lumen, curve, radius, within=0.45):
     return (lumen.distance.values[tuple(index.T)] - (distance - radius))[middle] / VOXEL
 
 
+@pytest.mark.quick(2)
 @pytest.mark.parametrize("radius", [0.6, 2.0])
 @pytest.mark.parametrize(("noise", "bar"), [(0.0, 0.05), (90.0, 0.1)])
 def test_wall_of_a_blurred_tube_is_where_it_was_drawn(radius, noise, bar):
@@ -54,6 +55,7 @@ def test_wall_of_a_blurred_tube_is_where_it_was_drawn(radius, noise, bar):
     assert np.sqrt(np.mean(error**2)) < bar
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize(("scale", "noise", "told"), [(0, 60.0, False), (0, 150.0, True), (None, 150.0, False)])
 def test_a_scale_that_leaves_too_much_noise_is_told(scale, noise, told):
     """The wall was off by 1.3 voxels (rms), 4 at places, and nothing said so in a vessel that nothing runs beside."""
@@ -79,6 +81,7 @@ def test_the_wall_of_an_aorta_is_where_it_was_drawn(radius):
     assert np.abs(np.mean(error - np.hypot(at[:, 0], at[:, 1]))) < 0.1 * voxel
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize(("noise", "spot"), [(0.0, -1000.0), (0.0, -1024.0), (40.0, -1000.0)])
 def test_nothing_beyond_a_round_field_of_view_is_what_surrounds_a_vessel(noise, spot):
     """Set to -1000 there, or air, a vessel at the rim was told from it: the lumen was the body, frames were refused."""
@@ -95,6 +98,7 @@ def test_nothing_beyond_a_round_field_of_view_is_what_surrounds_a_vessel(noise, 
     assert len(index) > 3000
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize("noise", [0.0, 90.0])
 def test_bone_that_touches_is_not_what_the_vessel_is_as_bright_as(noise):
     """It is deeper than the vessel: its grey was taken for the plateau, and the wall lay 0.2 voxels too far in."""
@@ -110,6 +114,7 @@ def test_bone_that_touches_is_not_what_the_vessel_is_as_bright_as(noise):
     assert touched.wall_level == pytest.approx(alone.wall_level, abs=0.03 * 900.0)
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize(("noise", "darkest", "spot"), [(0.0, 0.0, False), (60.0, 0.0, False), (60.0, 150.0, True)])
 def test_a_vessel_whose_grey_is_cut_off_is_told(noise, darkest, spot):
     """A window narrower than the vessel is bright: its wall lay 0.4 voxel too far out, without a word."""
@@ -130,6 +135,7 @@ DAILY = [(0.6, 150.0, 0.0), (2.0, 60.0, 0.5), (0.6, 60.0, 0.8), (2.0, 150.0, 1.5
 NOISES = itertools.product((0.6, 2.0), (60.0, 150.0), (0.0, 0.5, 0.8, 1.5))
 
 
+@pytest.mark.quick(2)
 @pytest.mark.parametrize(
     ("radius", "noise", "correlation"), [*DAILY, *later(*(row for row in NOISES if row not in DAILY))]
 )

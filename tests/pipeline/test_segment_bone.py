@@ -44,6 +44,7 @@ def test_what_touches_the_wall_is_flagged_with_its_place(x, size, level):
     assert 0.5 < place[0] < 3.5
 
 
+@pytest.mark.slow
 def test_bone_at_a_distance_a_wire_and_a_plain_vessel_are_not():
     z = np.arange(2.0, 25.0, 0.05)
     wire = np.stack([1.2 * np.sin(0.2 * z), 1.2 * np.cos(0.2 * z), z], axis=1)
@@ -54,6 +55,7 @@ def test_bone_at_a_distance_a_wire_and_a_plain_vessel_are_not():
     assert not any("touches its wall" in text for text in segment(scene.frame, scene.entry[None]).warnings)
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize("noise", [0.0, 110.0, *later(60.0)])
 def test_bone_hardly_brighter_than_the_vessel_is_told_by_the_two_greys_of_its_depth(noise):
     wide = np.linspace(9.0, 21.0, 241)
@@ -66,6 +68,7 @@ def test_bone_hardly_brighter_than_the_vessel_is_told_by_the_two_greys_of_its_de
     assert 9.0 < z < 21.0
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize("noise", [0.0, 220.0, *later(60.0)])
 def test_a_vessel_of_one_grey_has_one_around_a_wire_too(noise):
     z = np.arange(2.0, 25.0, 0.05)

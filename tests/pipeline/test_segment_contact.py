@@ -73,6 +73,7 @@ def test_a_membrane_thinner_than_a_voxel_is_seen_by_its_darker_sheet(membrane_mm
     assert 12.0 < area < 40.0  # 1.9 mm wide over 10 mm, and up to twice that as faces of voxels are counted
 
 
+@pytest.mark.quick(2)
 @pytest.mark.parametrize(
     ("anatomy", "low", "high"),
     [

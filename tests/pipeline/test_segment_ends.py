@@ -60,6 +60,7 @@ def places(texts: list[str]) -> np.ndarray:
     return np.array([text.split("scan at ")[1].split(" mm")[0].split(", ") for text in texts], float)
 
 
+@pytest.mark.quick(2)
 @pytest.mark.parametrize("seed", [0, *(pytest.param(n, marks=pytest.mark.slow) for n in (1, 2))])
 @pytest.mark.parametrize(
     ("radius", "width", "degrees", "noise"),
@@ -109,12 +110,14 @@ SILENT = {
 }
 
 
+@pytest.mark.quick(2)
 @pytest.mark.parametrize("seed", [0, *later(1)])
 @pytest.mark.parametrize("name", SILENT)
 def test_what_ends_or_goes_on_beside_is_not_said(name, seed):
     assert said(scan(SILENT[name], seed=seed)) == []
 
 
+@pytest.mark.quick(2)
 @pytest.mark.parametrize(("level", "expected"), [(0.45, 0), (0.8, 1), (1.0, 1), (1.6, 0)])
 def test_what_lies_ahead_is_as_bright(level, expected):
     both = np.minimum(BLUNT, BEYOND)

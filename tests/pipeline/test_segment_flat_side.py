@@ -14,6 +14,7 @@ from tests.studies.seeing import render
 from tests.studies.seeing.scenes import Draft
 
 
+@pytest.mark.quick(2)
 @pytest.mark.parametrize(("seed", "filled", "told"), [(0, 0.5, True), (1, 0.75, True), (2, 0.5, True), (1, 1.0, False)])
 def test_a_vessel_filled_in_part_is_told(seed: int, filled: float, told: bool) -> None:
     """Half a lumen came without a word, and wires beside it as leaving the lumen."""

@@ -43,6 +43,7 @@ def test_a_vessel_along_the_voxels_has_no_layer():
     assert layer_in(distances, greys + np.random.default_rng(0).normal(0.0, 40.0, len(greys))) is None
 
 
+@pytest.mark.quick(2)
 @pytest.mark.parametrize(
     ("greys", "thick_mm"),
     [
@@ -61,6 +62,7 @@ def test_the_lumen_ends_where_the_silicone_begins(greys, thick_mm, noise):
     assert any("a layer of grey" in warning for warning in lumen.warnings)
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize(("radius_mm", "thick_mm", "blur"), [(1.5, 0.9, 1.2), (2.4, 0.75, 1.2)])
 def test_a_thin_layer_is_not_taken_for_a_bright_middle(radius_mm, thick_mm, blur):
     """A parabola explains it nearly as well as two edges: the lumen was 0.7 mm too wide."""
@@ -78,6 +80,7 @@ def test_a_block_of_silicone_is_no_layer(greys, thick_mm):
     assert not any("a layer of grey" in warning for warning in lumen.warnings)
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize(
     ("greys", "thick_mm", "noise"), [((400.0, 300.0, -1000.0), 4.0, 20.0), ((600.0, 300.0, 0.0), 3.0, 60.0)]
 )
@@ -91,6 +94,7 @@ def test_a_vessel_in_resin_of_nearly_its_grey_is_no_part_of_the_resin(greys, thi
     assert any("of grey 30" in warning and "that surrounds the vessel" in warning for warning in lumen.warnings)
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize(("greys", "noise"), [((150.0, 300.0, -1000.0), 20.0), ((380.0, 300.0, 0.0), 45.0)])
 def test_a_vessel_darker_than_the_resin_or_hardly_brighter_is_told(greys, noise):
     scan, curve, _ = phantom(greys, 3.0, noise)
@@ -131,6 +135,7 @@ def test_a_vessel_of_little_noise_or_with_a_darker_middle_is_whole(radius_mm, da
     assert not any("surrounds" in warning for warning in lumen.warnings)
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize(("radius_mm", "brighter", "noise"), [(9.0, 0.06, 1.0), (9.0, 0.25, 20.0), (4.0, 0.4, 10.0)])
 def test_a_vessel_with_a_brighter_middle_is_whole(radius_mm, brighter, noise):
     """It came out at a third: one that fills the box around its seed was its middle, or had "a layer" around that."""
@@ -154,6 +159,7 @@ def test_where_all_is_brighter_than_the_seed_no_level_is_taken_from_the_rest():
         segment(scan, np.array([[0.0, 0.0, 16.0]]), wire_radius_mm=0.6)
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize("least", [0.6, 0.8])
 def test_a_part_that_is_filled_less_surrounds_nothing(least):
     """Half of the vessel along its way, or half of it across, as medium that has settled."""

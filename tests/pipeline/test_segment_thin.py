@@ -45,6 +45,7 @@ def wall_along(lumen):
     return 0.9 - away.mean(), inside.mean()
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize(
     ("radius_voxels", "least"), [(0.67, 0.9), (1.0, 0.99), (1.67, 0.99), *later((0.83, 0.95), (1.33, 0.99))]
 )
@@ -96,6 +97,7 @@ def test_a_threshold_that_finds_more_than_the_faintest_grey_keeps_the_vessel():
     assert np.mean(map_coordinates(loose.distance.values, inside, order=1) < 0) > 0.99
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize(("share", "expected"), [(0.35, True), (0.45, True), (1.0, False)])
 def test_a_branch_that_is_filled_too_little_is_said(share, expected):
     """Of 1 mm radius, filled to 35 to 50 %, two thirds of it and more were missing without a word."""
@@ -106,6 +108,7 @@ def test_a_branch_that_is_filled_too_little_is_said(share, expected):
     assert any("something like a branch" in text for text in lumen.warnings) is expected
 
 
+@pytest.mark.quick(2)
 @pytest.mark.parametrize(("gap_mm", "tilt_deg"), [(0.6, 0.0), (0.8, 0.0), (0.6, 40.0), (0.8, 70.0)])
 def test_a_thin_vessel_that_passes_by_is_no_branch(gap_mm, tilt_deg):
     """Of 0.5 mm radius, two voxels beside the vessel: it was its branch, all along, in silence."""

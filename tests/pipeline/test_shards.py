@@ -96,6 +96,7 @@ def test_a_case_that_another_shard_calibrated_with_is_not_missed(
     assert [case.name for case in (tmp_path / "out" / "cases").iterdir()] == [second.id]
 
 
+@pytest.mark.quick(2)
 @pytest.mark.parametrize(
     ("address", "said"),
     [

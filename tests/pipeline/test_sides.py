@@ -71,6 +71,7 @@ def test_of_two_tissues_the_brighter_one_surrounds_a_vessel():
     assert any("or is far thicker, hangs together" in text for text in lumen.warnings)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("seed", "most"), [(0, 0.35), pytest.param(12, 0.2, marks=pytest.mark.slow)])
 def test_medium_that_has_settled_is_said_and_the_wall_found(seed: int, most: float) -> None:
     row = look("contrast that has settled", seed)

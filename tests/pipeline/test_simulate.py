@@ -85,6 +85,7 @@ STUDY = MANIFEST.replace("none.stl", "tube.swc").replace("6.0, 12.0", "10.0, 10.
 CATHETER = "catheter = {bending_stiffness_N_mm2 = 50.0, radius_mm = 0.9, insertion_mm = [0.0, 9.0, 4.0]}\n"
 
 
+@pytest.mark.slow
 def test_a_catheter_is_a_key_of_the_case(tmp_path: Path) -> None:
     """From the manifest through check and run: it straightens the second frame and, drawn back, lets the third bend."""
     (tmp_path / "tube.swc").write_text("1 0 0 0 -5 6 -1\n2 0 0 0 25 6 1\n", encoding="utf-8")

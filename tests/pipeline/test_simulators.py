@@ -321,6 +321,7 @@ def grown(tip: Array, _depth: Array, _rng: np.random.Generator) -> Array:
     return 0.1 + 0.9 * np.clip((6.0 - tip) / 6.0, 0.0, 1.0)
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize(("early_mm", "back"), [(0.8, 1.1), (1.95, 3.0)])
 def test_a_wire_that_ends_early_is_not_nearer_than_the_whole_one(tmp_path: Path, early_mm: float, back: float) -> None:
     """Cut by 1.95 mm in the worst frames it was nearer, 1.13 to 2.73 times, led at the tip and was good, unwarned."""
@@ -370,6 +371,7 @@ def test_a_frame_without_points_in_common_is_left_out() -> None:
     assert [len(parts) for parts in found.values()] == [1, 2], "of one that is not compared its own is left out"
 
 
+@pytest.mark.slow
 def test_report_makes_every_table_of_a_score_again(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """simulators/failures.csv stayed as it was, and the root's failures were the first simulator's alone."""
     good, bad = write_tree(tmp_path, even(0.2)), write_tree(tmp_path / "simulators" / "bad", even(0.3), ((1, 2),))
@@ -389,6 +391,7 @@ def test_report_makes_every_table_of_a_score_again(tmp_path: Path, capsys: pytes
     assert "side by side" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_a_case_that_one_simulator_has_lost_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Of the first simulator it was; of the others nothing was said, and the rest stood there as ok."""
     good, bad = (write_tree(folder, even(0.2)) for folder in (tmp_path, tmp_path / "simulators" / "bad"))

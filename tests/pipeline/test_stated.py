@@ -54,6 +54,7 @@ def test_the_end_of_a_coil_tells_where_the_tip_is_even_where_that_is_not_seen(se
     assert abs(_end(opacity, grey, arc, np.arange(1.0, seen + 20.0, 0.5 * blur), blur) - end) < blur
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize(
     ("case", "seed"),
     [

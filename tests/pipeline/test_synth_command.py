@@ -161,6 +161,7 @@ def test_an_absent_extra_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert "wireval[conebeam]" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_an_anatomy_file_becomes_a_study(tmp_path: Path) -> None:
     """A straight tube as SWC, radius 2 mm, 60 mm long."""
     rows = [f"{i + 1} 3 0 0 {i} 2.0 {i if i else -1}" for i in range(61)]
@@ -197,6 +198,7 @@ def test_friction_of_the_true_wire_is_in_its_truth_and_its_manifest(tmp_path: Pa
     assert np.all(np.linalg.norm(ends["0.3"] - ends["none"], axis=1) > 0.01)
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize("how", [signal.SIGTERM, signal.SIGKILL])
 def test_no_process_outlives_the_command(how: signal.Signals, tmp_path: Path) -> None:
     """Insertions were drawn to their end, minutes after the command had been ended."""

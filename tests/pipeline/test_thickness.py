@@ -67,6 +67,7 @@ def test_a_wall_that_tells_the_blur_badly_leaves_a_right_radius_alone() -> None:
     assert too_thin(wire, vessel, 0.36), "a diameter given for the radius is told"
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize("way", ["", "wire", "greys"])
 def test_walls_beside_a_wire_or_in_few_greys_tell_the_blur_badly(way: str) -> None:
     scene = Draft(np.random.default_rng(0)).scan(16)

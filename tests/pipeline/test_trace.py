@@ -92,6 +92,7 @@ def test_a_scan_beside_the_lumen_shows_none_of_it():
     assert not shows_lumen(Volume(np.zeros((4, 4, 4), np.float32), origin_mm=[9.0, 0.0, 0.0]), lumen)
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize("has_reference", [True, False])
 def test_a_wrong_entry_is_told_where_the_brightest_line_is(has_reference):
     """It was told to check that the frame shows a wire, which it did: 6 mm beside the entry."""
@@ -142,6 +143,7 @@ def test_a_vessel_that_moved_is_not_called_a_dark_line():
     assert DARK not in hint_of_lines(vessel_with(0.8, 0.3), vessel_with(0.8), np.array([0.0, 0.0, 5.0]))
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize(("cnr", "mean_bar", "tip_bar"), [(16, 0.05, 0.4), (8, 0.08, 0.7), (4, 0.15, 1.1)])
 def test_the_curve_lies_on_the_wire_as_closely_as_noise_allows(cnr, mean_bar, tip_bar):
     frame, reference, lumen = scans(cnr)
@@ -194,6 +196,7 @@ def test_the_curve_turns_with_the_volume():
     assert point_to_curve(other.points_mm, plain.points_mm)[0].max() < 0.1 * VOXEL
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize("has_reference", [True, False])
 def test_greys_in_another_unit_make_no_other_curve(has_reference):
     """Attenuation per mm, say, in which all noise lies far below 1."""
@@ -335,6 +338,7 @@ def test_memory_for_the_numbers_of_voxels_is_left_as_it_was(has_reference):
     assert not any(array.any() for array in region.numbers._free)
 
 
+@pytest.mark.slow
 def test_correlated_noise_that_hides_the_wire_is_a_named_status():
     for seed in range(3):
         curve, _ = tangles.run(seed, cnr=4.0, kind=0, correlation=0.8)
@@ -452,6 +456,7 @@ def test_too_little_contrast_is_a_named_status_and_never_a_silent_error():
         assert curve.status is FrameStatus.TRACE_LOW_CONTRAST
 
 
+@pytest.mark.quick(2)
 @pytest.mark.parametrize("seed", [0, 1, 2, 3, 5])
 def test_gaps_crossings_and_parallel_turns(seed):
     """Seeds 0, 3: two gaps of up to 12 voxels; 1: strands crossing in contact; 2, 5: turns 3 voxels apart or more."""
@@ -462,6 +467,7 @@ def test_gaps_crossings_and_parallel_turns(seed):
         assert curve.sigma_mm[curve.flagged].min() > 3 * np.median(curve.sigma_mm)
 
 
+@pytest.mark.slow
 def test_turns_in_contact_from_the_frame_before():
     rng = np.random.default_rng(4)
     wire = tangles.coil(rng, 1.4 * tangles.VOXEL)
@@ -589,6 +595,7 @@ def test_a_curve_that_leaves_the_lumen_is_a_named_status():
     assert outside.flagged.any()
 
 
+@pytest.mark.slow
 def test_below_the_least_contrast_a_previous_curve_counts_only_where_the_frame_confirms_it_up_to_the_tip():
     """Seed 11: not nearly everywhere. Seed 15: the crest pauses before the tip, found behind that. 18: it does not."""
     for seed, status in ((11, FrameStatus.TRACE_LOW_CONTRAST), (15, FrameStatus.OK), (18, FrameStatus.OK)):

@@ -136,6 +136,7 @@ def in_plane(wire: Array, trace: Array, beam: Array) -> float:
     return float(np.sqrt(np.mean(np.square(gaps))))
 
 
+@pytest.mark.slow
 def test_a_projected_study_gives_the_in_plane_part_of_the_answer(
     known: Known, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -293,6 +294,7 @@ def there_and_back_and_there(frame: dict[str, Any]) -> dict[str, Any]:
     return frame | {"points_px": [*frame["points_px"], *frame["points_px"][::-1], *frame["points_px"]]}
 
 
+@pytest.mark.quick(2)
 @pytest.mark.parametrize(
     ("spoil", "said"),
     [

@@ -55,6 +55,7 @@ def test_a_tiny_wire_loads_what_frames_need(folder, reference):
     assert before >= 0.8 * after
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize(("cores", "until", "asked"), [(2, "trace", 1), (2, "segment", 0), (1, "trace", 0)])
 def test_code_is_loaded_beside_segmentation_where_there_are_cores(folder, tmp_path, monkeypatch, cores, until, asked):
     """Of the scan's own grey values, and with a reference as it has one; what goes wrong there costs nothing."""

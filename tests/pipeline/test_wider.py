@@ -29,6 +29,7 @@ def held(vessel: float) -> tuple[Lumen, Anchor]:
     return lumen, anchor(tube(0.0, vessel, 0), lumen)
 
 
+@pytest.mark.quick(2)
 @pytest.mark.parametrize(
     ("more_mm", "vessel", "voxels", "gain"),
     [(0.1, 400.0, 0.0, 1.3), (-0.15, 400.0, 0.0, 1.0), (0.2, -400.0, 0.0, 1.0), (-0.2, 400.0, 3.0, 0.8)],
@@ -52,6 +53,7 @@ def test_a_wider_or_narrower_vessel_than_the_references_is_told(
     assert written["wider_voxels"] == found.wider.voxels
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize(("vessel", "voxels", "gain"), [(400.0, 0.0, 1.3), (-400.0, 0.0, 1.0), (100.0, 2.0, 1.0)])
 def test_a_vessel_as_wide_as_the_references_is_silent(vessel: float, voxels: float, gain: float) -> None:
     _, to = held(vessel)
@@ -61,6 +63,7 @@ def test_a_vessel_as_wide_as_the_references_is_silent(vessel: float, voxels: flo
     assert found.wider.off_mm == 0.0
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize(("radius", "metal", "beside"), [(1.0, 1500.0, 0.0), (1.2, 4000.0, 0.9), (0.8, 900.0, 0.0)])
 def test_the_skirts_of_a_wire_that_fills_its_vessel_are_no_wall(radius: float, metal: float, beside: float) -> None:
     """Once 0.3 to 0.8 voxel, told: what lay next to metal all along was taken for wall."""

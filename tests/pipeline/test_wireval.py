@@ -67,6 +67,7 @@ def test_an_own_file_of_the_name_of_a_package_is_named(tmp_path: Path, name: str
     assert "rename it" in done.stderr
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize(("named", "left"), [("nonsense", "agg"), ("module://not.there", "module://not.there")])
 def test_a_notebook_s_backend_is_its_own(named: str, left: str) -> None:
     """Jupyter sets MPLBACKEND for ! commands, too: where the backend is not installed, each ended in a ValueError."""
@@ -418,6 +419,7 @@ def test_a_plain_script_may_use_several_processes(tmp_path: Path) -> None:
     assert (done.stdout, done.stderr) == ("begun\n[1, 2]\n", "")
 
 
+@pytest.mark.slow
 def test_a_gate_that_any_simulator_closes_is_told(tmp_path: Path) -> None:
     """It was told of the first alone: a script went on where the command line had exit code 1."""
     manifest, wires = run_known(tmp_path)

@@ -158,6 +158,7 @@ def deaf(path: Path) -> None:
     ctypes.PyDLL(None).sleep(LONG_S)
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
 def test_no_worker_outlives_its_parent(tmp_path: Path, how: signal.Signals) -> None:
     """The parent may have no chance to say anything, the worker none to listen."""

@@ -11,6 +11,7 @@ from reports.calibration import render_calibration
 from tests.reports import fake_pages
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize(
     ("stated", "scale", "said", "unsaid"),
     [

@@ -135,6 +135,7 @@ def test_folders_against_themselves_and_against_a_worse_copy(tmp_path: Path) -> 
     assert len(diff.diff_folders(out, worse, tolerance).regressions) == 3, "every frame of the case is missing"
 
 
+@pytest.mark.slow
 def test_a_calibration_case_of_one_run_alone_is_named_and_not_compared(tmp_path: Path) -> None:
     """A calibrated run leaves them out itself: its diff with the run before was WORSE, case present -> missing."""
     learnt, judged = FakeCase("c", frames=3, role="calibration"), FakeCase("d", frames=3)

@@ -74,6 +74,7 @@ def test_an_empty_run_has_no_figure(name: str) -> None:
     assert RUN_FIGURES[name](run) is None
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize("count", [1, 2])
 def test_very_short_insertions_are_drawn(count: int, tmp_path: Path) -> None:
     out = write_run(tmp_path / "out", (FakeCase("c", frames=count, truth=True), FakeCase("d", frames=count)))
@@ -305,6 +306,7 @@ def test_one_scored_frame_shows_its_predictors(tmp_path: Path) -> None:
     assert all(line.get_marker() not in ("", "None", None) for line in lines)
 
 
+@pytest.mark.slow
 def test_the_cells_of_few_frames_have_their_numbers(tmp_path: Path) -> None:
     """0.27 and 1.26 mm were two shades of magenta."""
     for frames, numbers in ((3, ["0.27", "1.26", "12"]), (17, [])):
@@ -670,6 +672,7 @@ def test_pictures_of_scans_keep_white_and_the_colours_of_the_curves(tmp_path: Pa
     assert sizes[1] < 0.6 * sizes[0]
 
 
+@pytest.mark.slow
 def test_panels_of_scans_are_known_and_no_other_figure_has_any(tmp_path: Path) -> None:
     """Maps of errors and correlations stayed light on a dark page, as the paper around scans did."""
     case = read_case(write_run(tmp_path / "out", (FakeCase("c", frames=3),)) / "cases" / "c")
@@ -725,6 +728,7 @@ def test_an_axis_of_a_calibration_ends_where_values_end() -> None:
     assert (title.get_text(), title.get_color(), title.get_weight()) == ("friction: not seen", "black", "bold")
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize(("cases", "said"), [(1, False), (2, True)])
 def test_a_caption_says_only_what_is_drawn_of_the_cases(cases: int, said: bool, tmp_path: Path) -> None:
     """It told of thin lines beside a single one."""
@@ -737,6 +741,7 @@ def test_a_caption_says_only_what_is_drawn_of_the_cases(cases: int, said: bool, 
     assert len(drawing.figure.axes[0].get_lines()) == 1 + said * cases
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize("frame", [None, 1])
 def test_the_caption_speaks_of_a_cross_where_there_is_one(frame: int | None, tmp_path: Path) -> None:
     """It named "a filled cross" in cases whose tips all lie in the right branch."""

@@ -388,6 +388,7 @@ def test_a_case_that_is_worse_than_a_guess_is_marked_and_named(tmp_path: Path) -
     assert "only marked rows" in page
 
 
+@pytest.mark.quick(1)
 @pytest.mark.usefixtures("scarce")
 @pytest.mark.parametrize(("skill", "said"), [(0.9, True), (None, False)])
 def test_a_case_page_says_who_is_judged_over_the_run_alone(tmp_path: Path, skill: float | None, said: bool) -> None:

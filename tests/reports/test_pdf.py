@@ -56,6 +56,7 @@ def test_worst_is_the_same_on_every_page(tmp_path: Path) -> None:
     assert re.findall("none|poor|far|fine", pages[3].partition("skill_strongest")[2])[:4] == summary["case"].tolist()
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("unseen")
 def test_the_worst_case_is_the_one_that_the_first_page_names(tmp_path: Path) -> None:
     """It said "worse than a guess: far", and showed another case, of which a frame had failed, as the worst."""
@@ -69,6 +70,7 @@ def test_the_worst_case_is_the_one_that_the_first_page_names(tmp_path: Path) -> 
     assert "More of far" in pages[3]
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("unseen")
 def test_warnings_and_assumptions_are_whole(tmp_path: Path) -> None:
     """They were cut off after two lines, and the pages beside them half empty."""
@@ -118,6 +120,7 @@ def test_a_run_without_errors_has_its_four_pages(tmp_path: Path, cases: tuple[Fa
     assert len(re.findall(rb"/Type /Page\b", path.read_bytes())) == 4
 
 
+@pytest.mark.slow
 def test_figures_have_200_dots_an_inch_and_fill_their_pages(tmp_path: Path) -> None:
     """They were those of the screen, 100 dots an inch, and the first two pages of a small run half empty."""
     out = write_run(tmp_path / "out", (FakeCase("fine", frames=5), FakeCase("poor", frames=4, error_mm=0.6)))

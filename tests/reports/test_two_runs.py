@@ -466,6 +466,7 @@ def test_a_page_of_two_runs_without_a_case_in_common(first: Path, second: Path, 
     assert "present" in page.read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_two_scores_are_compared_simulator_by_simulator(
     first: Path, second: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -593,6 +594,7 @@ def test_a_baseline_without_numbers_leaves_no_gate_open(
     assert "nope: no such folder" in capsys.readouterr().err
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize("spoil", ["half", POINTS.file, "result.json"])
 def test_a_damaged_candidate_closes_the_gate_and_no_baseline_is(
     first: Path, second: Path, spoil: str, capsys: pytest.CaptureFixture[str]

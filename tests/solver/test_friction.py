@@ -76,6 +76,7 @@ def test_friction_raises_the_push_and_is_not_computed_without_a_coefficient() ->
     assert work[0] == 0.0 < work[1] < work[2]
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize(
     ("wire", "hull"),
     [(WIRE, "offset"), (CURVED, "samples:16"), *later((WIRE, "samples:16"), (CURVED, "offset"))],
@@ -241,6 +242,7 @@ def test_a_wire_that_friction_holds_stays_where_it_is(longest_mm: float, monkeyp
     np.testing.assert_allclose(one.joints_mm, other.joints_mm, rtol=0.0, atol=0.01)
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize("step_mm", [0.05, 0.02, 0.01])
 def test_a_wire_that_friction_lets_go_is_followed(step_mm: float) -> None:
     """Loads that fall ever faster had not settled after 60 rounds: steps of 0.02 mm ended at 14.9 mm, for good."""

@@ -65,6 +65,7 @@ def test_without_friction_a_straight_wire_rolls_free() -> None:
     assert all(s.reaction_torque_N_mm == 0.0 and s.friction_energy_N_mm == 0.0 for s in pressed(0.0, 5.0)[40:])
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize(("coefficient", "rest"), [(0.0, 0.08), (0.1, 0.08), *later((0.1, 0.0))])
 def test_a_shaft_whips_in_a_bend_as_the_closed_form_says(coefficient: float, rest: float) -> None:
     """Hand and tip of a pulled shaft in a curved tube, with and without a bend of its own, with and without friction.

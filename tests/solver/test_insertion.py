@@ -102,6 +102,7 @@ def test_dead_end_keeps_the_last_good_state() -> None:
     assert steps.sum() == pytest.approx(after.depth_mm)
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize(
     ("bore", "stiffness", "segment"), [(0.3, 1.0, 1.0), (0.4, 100.0, 2.0), *later((0.5, 1.0, 2.0))]
 )

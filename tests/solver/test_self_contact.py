@@ -95,6 +95,7 @@ def in_sac() -> Insertion:
     return Insertion(wire, sac(), [-0.23, 0.75, -14.0], [0, 0, 1])
 
 
+@pytest.mark.slow
 def test_a_wire_that_passed_through_itself_between_two_depths_says_so_from_there_on() -> None:
     """At 55 mm it is at rest and free of itself, but one strand lies on the other side of another one."""
     alone = in_sac()

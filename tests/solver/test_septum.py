@@ -107,6 +107,7 @@ def test_a_resampled_map_has_its_septum_still(voxel: float, times: int, order: i
     assert not any(strays(s, beside(0.6)) for s in found)
 
 
+@pytest.mark.quick(2)
 @pytest.mark.parametrize("lumen", ["hairpin", "necked", "narrowed", "carina"])
 @pytest.mark.parametrize("change", [(0.1, 0.3), (0.2, 0.3), (0.3, 0.45)])
 def test_no_false_alarm_in_smoothed_maps(lumen: str, change: tuple[float, float]) -> None:
@@ -149,6 +150,7 @@ def test_small_steps_do_not_carry_it_through(method: str) -> None:
 WAYS = {"parallel": (0, 0, 1), "across": (0, 1, 0), "oblique": (0, 1, 1)}
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize("gap", [0.0, 0.6, *later(0.3)])
 def test_vessels_that_touch(gap: float) -> None:
     """Random walls, wires, tips and voxels; a septum that the grid does not hold (gap 0) is none to pass, either."""
@@ -201,6 +203,7 @@ def carina(p: Array) -> Array:
     return fork_distance(p, 1.2, 0.35, 8.0)
 
 
+@pytest.mark.quick(2)
 @pytest.mark.parametrize("lumen", [hairpin, necked, stenosed, carina])
 @pytest.mark.parametrize("stiffness", [0.1, 1.0, 30.0])
 @pytest.mark.parametrize("rest", [0.0, 0.15])

@@ -194,6 +194,7 @@ def rod_behind_a_shaft(depth: float, rest: float, load: tuple[float, float, floa
     return lambda at: found.sol(at)[9:12].T, float(found.sol(0.0)[14])
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize(("rest", "shaft"), [(0.15, 0.0), (0.15, 30.0), (0.3, 50.0)])
 def test_a_shaft_twists_before_the_wire_bends(rest: float, shaft: float) -> None:
     """In one rotation vector with the bend a lag of 62 degrees made it of first order, 0.18 mm at 1 mm."""

@@ -110,6 +110,7 @@ def oracle(law: Any) -> tuple[Array, float]:
     return naive.joints_of(controls, zero, length, base, (0, 0, 0)), energy
 
 
+@pytest.mark.slow
 def test_the_wire_rests_where_the_new_law_has_its_minimum(other: dict[str, Any]) -> None:
     joints, energy = oracle(stiffening)
     assert other["energies"][1] == pytest.approx(energy, rel=1e-6)

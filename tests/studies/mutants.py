@@ -1,11 +1,12 @@
 """Do the tests notice? Random small changes of product lines, each against the tests: ``make mutants``.
 
 A change is drawn with a fixed seed: a comparison, a sum, a product, a condition, a truth value or a number of one line
-becomes its neighbour. One run of the tests with coverage tells which of them execute the line: the quickest of these
-run first, up to the first that fails. Kernels, which coverage does not see, have the tests that execute what calls them
-(see ``callers``), and those that name them. The solver's are first tried without a compiler, on the kept numbers of its
-scenes: that takes seconds, compiling it minutes. A change that none of its tests fails on has survived, and is printed
-to be looked at.
+becomes its neighbour. Two kinds that change nothing are not drawn: a bound that floats meet by accident alone (`x_mm <
+0.5` or `<=`; at zero they do meet), and `strict=` of zip, which asserts. One run of the tests with coverage tells which
+of them execute the line: the quickest of these run first, up to the first that fails. Kernels, which coverage does not
+see, have the tests that execute what calls them (see ``callers``), and those that name them. The solver's are first
+tried without a compiler, on the kept numbers of its scenes: that takes seconds, compiling it minutes. A change that
+none of its tests fails on has survived, and is printed to be looked at.
 """
 
 from __future__ import annotations
@@ -34,7 +35,11 @@ NEIGHBOUR: dict[type, type] = {
     ast.Is: ast.IsNot, ast.IsNot: ast.Is, ast.In: ast.NotIn, ast.NotIn: ast.In, ast.Add: ast.Sub, ast.Sub: ast.Add,
     ast.Mult: ast.Div, ast.Div: ast.Mult, ast.And: ast.Or, ast.Or: ast.And,
 }  # fmt: skip
+BOUNDS = ast.Lt, ast.LtE, ast.Gt, ast.GtE
+UNITS = "_mm", "_mm2", "_mm3", "_deg", "_rad", "_N", "_N_mm", "_per_mm", "_s"
 FEW, NEAREST, MOST = 8, 2, 200
+ALL = "-m", "not peers"
+"""Tests of every commit and those of `make study`."""
 SOLVER, PLAIN = "solver/_kernels/", "tests/numbers/test_solver.py"
 MEANT = b"was that meant?"
 """What the kept numbers say of a difference. An index beyond an array, which compiled code does not see, says more."""
@@ -60,10 +65,24 @@ class Mutant:
         return text[: self.start] + self.after.encode() + text[self.end :]
 
 
+def by_accident(compared: ast.Compare) -> bool:
+    """Whether its two sides are floats, by how they are written: 0.5, a name that states its unit. Zero is met."""
+    nodes = [*ast.walk(compared)]
+    counted = any(isinstance(n, ast.Constant) and n.value == 0 for n in (compared.left, *compared.comparators))
+    counted |= any(_name(n) in ("len", "ndim", "shape", "size") for n in nodes)
+    return not counted and any(_name(n).endswith(UNITS) or isinstance(getattr(n, "value", None), float) for n in nodes)
+
+
+def _name(node: ast.AST) -> str:
+    return node.id if isinstance(node, ast.Name) else node.attr if isinstance(node, ast.Attribute) else ""
+
+
 def changed(node: ast.AST) -> ast.AST | None:
     """The node's neighbour; None for a kind of node that has none."""
     new = copy.deepcopy(node)
     if isinstance(new, ast.Compare) and type(new.ops[0]) in NEIGHBOUR:
+        if isinstance(new.ops[0], BOUNDS) and by_accident(new):
+            return None
         new.ops[0] = NEIGHBOUR[type(new.ops[0])]()
     elif isinstance(new, (ast.BinOp, ast.BoolOp)) and type(new.op) in NEIGHBOUR:
         new.op = NEIGHBOUR[type(new.op)]()
@@ -85,16 +104,21 @@ def mutants_of(path: Path) -> Iterator[Mutant]:
     for line in text.splitlines(keepends=True):
         starts.append(starts[-1] + len(line))
     functions = [n for n in ast.walk(ast.parse(text)) if isinstance(n, (ast.FunctionDef, ast.AsyncFunctionDef))]
-    seen = set()
+    words = (node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.keyword))
+    seen = {_place(word.value) for word in words if word.arg == "strict"}
     for node in (inner for function in functions for statement in function.body for inner in ast.walk(statement)):
         new = changed(node) if isinstance(node, ast.expr) else None
-        if new is None or not isinstance(node, ast.expr) or (node.lineno, node.col_offset, type(node)) in seen:
+        if new is None or not isinstance(node, ast.expr) or _place(node) in seen:
             continue
-        seen.add((node.lineno, node.col_offset, type(node)))
+        seen.add(_place(node))
         start = starts[node.lineno - 1] + node.col_offset
         end = starts[(node.end_lineno or node.lineno) - 1] + (node.end_col_offset or 0)
         name = path.relative_to(ROOT).as_posix()
         yield Mutant(name, node.lineno, start, end, text[start:end].decode(), ast.unparse(new))
+
+
+def _place(node: ast.expr) -> tuple[int, int, type]:
+    return node.lineno, node.col_offset, type(node)
 
 
 def tests_of(file: str) -> list[str]:
@@ -175,7 +199,7 @@ def within(tests: list[str], seconds: float, known: Executed) -> list[str]:
 
 def fails(tests: list[str], tree: Path, seconds: float, compiled: bool = True) -> str:
     """The first of these tests that fails, or takes for ever; empty for none. No test to be found is no failure."""
-    words = [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", *tests]
+    words = [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", *ALL, *tests]
     env = os.environ | {"PYTHONPATH": str(tree)} | ({} if compiled else {"NUMBA_DISABLE_JIT": "1"})
     with subprocess.Popen(words, cwd=tree, env=env, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as done:
         # by the clock: under a limit of processor time that time goes on in ticks, and tests that measure it fail
