@@ -101,6 +101,7 @@ def test_one_worker_runs_here_and_in_order(tmp_path: Path) -> None:
 
 
 def test_while_cases_run_the_collector_passes_over_what_was_imported_and_afterwards_no_more() -> None:
+    gc.unfreeze()  # tests are frozen once they are collected
     assert gc.get_freeze_count() == 0
     with imports_set_aside():
         assert gc.get_freeze_count() > 10_000
