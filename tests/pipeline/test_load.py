@@ -115,6 +115,13 @@ def test_bytes_of_an_nrrd_are_skipped_unpacked_and_lines_before_that(
             np.testing.assert_array_equal(load(read_header(path), box).values, want)
 
 
+@pytest.mark.parametrize("count", [0, 9])
+def test_an_nrrd_has_axes_but_not_too_many(tmp_path: Path, count: int) -> None:
+    (tmp_path / "a.nrrd").write_bytes(nrrd_of(b"", "encoding: raw").replace(b"dimension: 3", b"dimension: %d" % count))
+    with pytest.raises(LoadError, match=f"dimension: {count}; allowed: 3, or 4 for a sequence"):
+        read_header(tmp_path / "a.nrrd")
+
+
 def test_what_an_nrrd_cannot_skip_is_refused(tmp_path: Path) -> None:
     path, voxels = tmp_path / "a.nrrd", numbered().tobytes(order="F")
     path.write_bytes(nrrd_of(b"a head" + voxels, "encoding: raw", "byte skip: -1"))

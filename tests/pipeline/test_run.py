@@ -709,6 +709,8 @@ def test_an_unexpected_error_costs_one_case(
     said = capsys.readouterr().err.splitlines()
     assert said[-1] == "next: see to what the messages name, then wireval run study -o out --only second --resume"
     assert said[-1].partition("then ")[2] in (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
+    begun = json.loads((tmp_path / "out" / "provenance.json").read_text(encoding="utf-8"))
+    assert begun["argv"] == ["wireval", "run", "study", "-o", "out"]
     failures = pd.read_csv(tmp_path / "out" / "failures.csv")
     assert "burst pipe" in failures["message"][0]
     assert "RuntimeError" in (tmp_path / "out" / "cases" / "second" / "log.txt").read_text(encoding="utf-8")

@@ -36,7 +36,7 @@ NEIGHBOUR: dict[type, type] = {
     ast.Mult: ast.Div, ast.Div: ast.Mult, ast.And: ast.Or, ast.Or: ast.And,
 }  # fmt: skip
 BOUNDS = ast.Lt, ast.LtE, ast.Gt, ast.GtE
-UNITS = "_mm", "_mm2", "_mm3", "_deg", "_rad", "_N", "_N_mm", "_per_mm", "_s"
+UNITS = "_mm", "_mm2", "_mm3", "_deg", "_rad", "_n", "_n_mm", "_per_mm", "_s"
 FEW, NEAREST, MOST = 8, 2, 200
 ALL = "-m", "not peers"
 """Tests of every commit and those of `make study`."""
@@ -67,14 +67,14 @@ class Mutant:
 
 def by_accident(compared: ast.Compare) -> bool:
     """Whether its two sides are floats, by how they are written: 0.5, a name that states its unit. Zero is met."""
+    if any(isinstance(side, ast.Constant) and side.value == 0 for side in (compared.left, *compared.comparators)):
+        return False
     nodes = [*ast.walk(compared)]
-    counted = any(isinstance(n, ast.Constant) and n.value == 0 for n in (compared.left, *compared.comparators))
-    counted |= any(_name(n) in ("len", "ndim", "shape", "size") for n in nodes)
-    return not counted and any(_name(n).endswith(UNITS) or isinstance(getattr(n, "value", None), float) for n in nodes)
-
-
-def _name(node: ast.AST) -> str:
-    return node.id if isinstance(node, ast.Name) else node.attr if isinstance(node, ast.Attribute) else ""
+    names = [n.id if isinstance(n, ast.Name) else n.attr for n in nodes if isinstance(n, (ast.Name, ast.Attribute))]
+    if {"len", "ndim", "shape", "size"} & {*names}:
+        return False
+    floats = any(isinstance(n, ast.Constant) and isinstance(n.value, float) for n in nodes)
+    return floats or any(name.lower().endswith(UNITS) for name in names)
 
 
 def changed(node: ast.AST) -> ast.AST | None:
