@@ -77,12 +77,31 @@ def told_alike(before: Path, after: Path) -> str:
 
 
 def why_not_pooled(*outs: Path) -> str:
-    """Why nothing may be pooled over the cases of output folders: they are of different settings, or of manifests that
-    state them otherwise; empty where neither is so.
+    """Why nothing may be pooled over the cases of output folders: they are of different settings, of manifests that
+    state them otherwise, or of a file that changed between them; empty where none is so.
     """
     found = {out: results_in(out) for out in outs}
-    arrays = (_of_other_arrays(out) for out in outs)
-    return _of_other_settings(found) or _of_other_manifests(found) or next(filter(None, arrays), "")
+    others = (sentence for out in outs for sentence in (_of_changed_file(found[out]), _of_other_arrays(out)))
+    return _of_other_settings(found) or _of_other_manifests(found) or next(filter(None, others), "")
+
+
+def _mapping(value: object) -> Mapping[str, Any]:
+    """What a record holds by names; nothing where somebody else wrote something else there."""
+    return value if isinstance(value, Mapping) else {}
+
+
+def _of_changed_file(results: Mapping[str, Mapping[str, Any]]) -> str:
+    """The sentence on a file of several cases, as the parameters of a wire, that was another one for some of them."""
+    met: dict[str, dict[str, str]] = {}
+    for case, result in results.items():
+        for item in result.get("inputs", ()):
+            met.setdefault(str(item.get("path")), {}).setdefault(str(item.get("sha256")), case)
+    changed = next(((path, [*cases.values()]) for path, cases in met.items() if len(cases) > 1), None)
+    if changed is None:
+        return ""
+    path, (one, other, *_) = changed
+    what = f"Nothing is pooled: {path} was changed between case {one} and case {other}, which were computed with it"
+    return f"{what}; run all of them again (--resume, without --only; their shards, where there are shards)."
 
 
 def _of_other_arrays(out: Path) -> str:
@@ -121,7 +140,7 @@ def _of_other_manifests(found: Mapping[Path, Mapping[str, Mapping[str, Any]]]) -
         if len(manifests_in(run for run in runs if "stated" not in run)) > 1:
             apart |= results.keys()
         own = {name: result["stated"] for name, result in results.items() if result.get("stated")}
-        latest = {name: text for run in runs for name, text in run.get("stated", {}).items()}
+        latest = {name: text for run in runs for name, text in _mapping(run.get("stated")).items()}
         apart |= {name for name, text in latest.items() if own.get(name, text) != text}
     if not apart:
         return ""
@@ -205,7 +224,7 @@ def _stated(found: Mapping[str, Mapping[str, Any]], cases: Iterable[str]) -> dic
         values = {
             f"{table} {key}": value
             for part, table in STATED.items()
-            for key, value in told.get(part, {}).items()
+            for key, value in _mapping(told.get(part)).items()
             if not key.startswith(FOUND)
         }
         values |= {f"{OF_CASE} {name}": found[case].get(name) for name in AT_CHOICE}

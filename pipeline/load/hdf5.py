@@ -25,11 +25,11 @@ MOST_NAMES = 20
 
 def _volumes(file: h5py.File, source: Source) -> list[h5py.Dataset]:
     """The dataset named, or the 3-D datasets of the group named, in natural order."""
-    node = _inside(file, source.dataset or "/volume", source)
+    node = inside(file, source.dataset or "/volume", source)
     if isinstance(node, h5py.Group):
-        inside = [_inside(node, name, source) for name in in_order(node)]
-        _require_volumes(node, inside, source)
-        found = [item for item in inside if isinstance(item, h5py.Dataset) and item.ndim == 3]
+        members = [inside(node, name, source) for name in in_order(node)]
+        _require_volumes(node, members, source)
+        found = [item for item in members if isinstance(item, h5py.Dataset) and item.ndim == 3]
         if found:
             return found
     if isinstance(node, h5py.Dataset) and node.ndim in (3, 4):
@@ -40,12 +40,12 @@ def _volumes(file: h5py.File, source: Source) -> list[h5py.Dataset]:
     raise unusable(source.path, none + "Name a 3-D or 4-D dataset, or a group of 3-D ones, as FILE.h5#/name.")
 
 
-def _require_volumes(group: h5py.Group, inside: list[Any], source: Source) -> None:
+def _require_volumes(group: h5py.Group, members: list[Any], source: Source) -> None:
     """LoadError where a member that may be meant for a volume is none: those beside it would be taken for all frames.
 
     Numbers, datasets of one axis, as of depths, and groups of such may stand beside volumes.
     """
-    for name, item in zip(in_order(group), inside, strict=True):
+    for name, item in zip(in_order(group), members, strict=True):
         what = _unlike_a_volume(item)
         if what:
             where = f"{group.name.rstrip('/')}/{name}"
@@ -66,7 +66,7 @@ def _unlike_a_volume(item: Any) -> str:
     return "" if plain else f"a dataset of the shape {item.shape}"
 
 
-def _inside(group: h5py.Group, name: str, source: Source) -> Any:
+def inside(group: h5py.Group, name: str, source: Source) -> Any:
     """A member of a group, None where there is none; LoadError where its data lie in another file."""
     parts = [part for part in name.split("/") if part]
     for depth in range(1, len(parts) + 1):

@@ -18,7 +18,7 @@ from pipeline.arrays.polyline import UNITS_MM
 from pipeline.load.curves import READERS, distinct, points_in_table
 from pipeline.load.geometry import LoadError, Source, refused, unusable
 from pipeline.load.guard import size_of
-from pipeline.load.hdf5 import require_written, text_of
+from pipeline.load.hdf5 import inside, require_written, text_of
 from pipeline.load.order import last_counts
 from pipeline.load.outside import millimetres, to_whole
 from pipeline.load.stated import stated_in, stated_in_table
@@ -34,6 +34,8 @@ from solver import Status
 OF_KIND = {**READERS, ".vtk": read_vtk_points}
 IN_HDF5 = (".h5", ".hdf5")
 KINDS = (".csv", *OF_KIND, *IN_HDF5)
+MOST_POINTS = 1_000_000
+"""Of one wire in a HDF5 file: a few packed kB may stand for more than there is memory."""
 USUAL = {"space": "LPS", "unit": "mm"}
 """What is stated of coordinates, in the order of ``stated_in``, and what most have."""
 ATTRIBUTES = {"coordinates": "space", "space": "space", "length_unit": "unit", "units": "unit", "unit": "unit"}
@@ -120,9 +122,11 @@ def _in_hdf5(path: Path, count: int, space: str, unit: str) -> list[OtherFile]:
     size_of(path)
     try:
         with h5py.File(path, "r") as file:
-            groups = _by_number(path, file["frames"])
-            wires = {n: group["simulated_mm"] for n, group in groups.items() if "simulated_mm" in group}
-            _require_usual(path, file, file["frames"], *groups.values(), *wires.values())
+            frames = inside(file, "frames", Source(path))
+            groups = _by_number(path, frames)
+            held = {n: inside(group, "simulated_mm", Source(path)) for n, group in groups.items()}
+            wires = {n: wire for n, wire in held.items() if wire is not None}
+            _require_usual(path, file, frames, *groups.values(), *wires.values())
             points = {n: _written(path, wire) for n, wire in wires.items()}
             said = {n: text_of(groups[n].attrs.get("status", "")).lower() for n in wires}
     except (OSError, KeyError, ValueError, AttributeError, TypeError, RuntimeError) as error:
@@ -174,7 +178,7 @@ def _beside(wires: Path) -> dict[str, Any]:
 
 def _by_number(path: Path, frames: h5py.Group) -> dict[int, h5py.Group]:
     """The groups of frames by their numbers; LoadError where two have one number, as 1 and 001."""
-    groups = {to_whole(name): group for name, group in frames.items()}
+    groups = {to_whole(name): inside(frames, name, Source(path)) for name in frames}
     if len(groups) < len(frames):
         got = f"{len(frames)} groups of {len(groups)} numbers"
         raise unusable(path, f"got {got} below /frames; allowed: one of each number; remove the others")
@@ -185,6 +189,9 @@ def _written(path: Path, data: h5py.Dataset) -> Array:
     """The points of a dataset; TypeError where they are no numbers, LoadError where some were never written."""
     if data.dtype.kind not in "iuf":
         raise TypeError(f"{data.name} holds {data.dtype}")
+    if data.size > 3 * MOST_POINTS:
+        got = f"{data.name}: {data.size // 3} points; allowed: {MOST_POINTS}, one each µm of a metre"
+        raise unusable(path, f"{got}; write fewer, a few each mm")
     if data.size:
         require_written(path, data)
     return np.array(data, float)

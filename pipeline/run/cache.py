@@ -188,9 +188,9 @@ def _seal(key: str, body: bytes) -> bytes:
 
 
 def _content(path: Path) -> bytes:
-    """The bytes of a stored result; ValueError where a folder stands in its place."""
-    if path.is_dir():
-        raise ValueError("it is a folder")
+    """The bytes of a stored result; ValueError where a folder or a pipe stands in its place."""
+    if path.exists() and not path.is_file():
+        raise ValueError("it is no regular file")
     return path.read_bytes()
 
 

@@ -74,8 +74,10 @@ class Job:
         code = (package_version(), hash_of(Path(__file__)), versions(COMPUTING))
         given = self.settings.calibrated and self.settings.calibrated[0]
         named = (self.simulator,) if self.simulator else ()  # the page names the simulator
-        beside = None if self.case.simulated is None else result_beside(self.case.simulated.files)
-        return digest((self.case, self.settings.config, given, self.until, code, ERRORS.columns, beside, *named))
+        wires = () if self.case.simulated is None else self.case.simulated.files
+        # a wire is that of the frame whose number its file is named by
+        beside = result_beside(wires), [file.path.name for file in wires]
+        return digest((self.case, self.settings.config, given, self.until, code, ERRORS.columns, *beside, *named))
 
 
 def clear(folder: Path) -> str:

@@ -231,6 +231,30 @@ def test_a_lumen_is_of_plain_digits(tmp_path: Path, name: str, text: str, said: 
         read(path)
 
 
+@pytest.mark.parametrize("place", ["frames", "frames/0", "frames/0/simulated_mm"])
+@pytest.mark.parametrize("soft", [False, True])
+def test_wires_of_another_file_are_refused(tmp_path: Path, place: str, soft: bool) -> None:
+    """A link into another file was followed, whose changes nobody noticed: a score was kept that was of older wires."""
+    for name in ("all.h5", "other.h5"):
+        with h5py.File(tmp_path / name, "w") as file:
+            file["frames/0/simulated_mm"] = POINTS
+    with h5py.File(tmp_path / "all.h5", "a") as file:
+        del file[place]
+        file["away" if soft else place] = h5py.ExternalLink("other.h5", place)
+        if soft:
+            file[place] = h5py.SoftLink("/away")
+    with pytest.raises(LoadError, match=r"all\.h5: a link into another file; allowed: data in this file"):
+        read_wires([Source(tmp_path / "all.h5")], 1)
+
+
+def test_a_few_bytes_are_no_wire_of_gigabytes(tmp_path: Path) -> None:
+    """8 MB of packed zeros took 14 GB."""
+    with h5py.File(tmp_path / "all.h5", "w") as file:
+        file.create_dataset("frames/0/simulated_mm", (2_000_000, 3), "f8", chunks=(100_000, 3), compression="gzip")
+    with pytest.raises(LoadError, match=r"/frames/0/simulated_mm: 2000000 points; allowed: 1000000"):
+        read_wires([Source(tmp_path / "all.h5")], 1)
+
+
 @pytest.mark.parametrize("what", ["", "unwritten", "twice", "texts", "flags"])
 def test_wires_in_hdf5_are_written_and_of_numbers(tmp_path: Path, what: str) -> None:
     """Points that were never written lay at 0, 0, 0."""

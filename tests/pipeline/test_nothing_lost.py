@@ -545,7 +545,7 @@ def test_a_store_that_cannot_be_written_costs_a_warning(
     assert differences(whole, tmp_path / "out") == []
 
 
-@pytest.mark.parametrize("how", ["altered", "cut", "of another", "a folder"])
+@pytest.mark.parametrize("how", ["altered", "cut", "of another", "a folder", "a pipe"])
 def test_a_stored_result_that_was_changed_is_not_used(tmp_path: Path, how: str) -> None:
     said: list[str] = []
     mine = Store(tmp_path, said.append)
@@ -558,6 +558,9 @@ def test_a_stored_result_that_was_changed_is_not_used(tmp_path: Path, how: str) 
     if how == "a folder":
         first.unlink()
         (first / "within").mkdir(parents=True)
+    elif how == "a pipe":
+        first.unlink()
+        os.mkfifo(first)
     else:
         first.write_bytes({"altered": altered, "cut": content[:-9], "of another": second.read_bytes()}[how])
     assert mine.get("trace", "a" * 64) is None

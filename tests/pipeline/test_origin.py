@@ -181,6 +181,20 @@ def test_shards_of_different_settings_are_not_pooled(
     assert len(pd.read_csv(out / "overall.csv")) == 1
 
 
+def test_cases_of_a_file_that_changed_between_them_are_not_pooled(study: Path, tmp_path: Path) -> None:
+    """A file of several cases, as the parameters of a wire, that was edited before the second shard: pooled, and ok."""
+    frame = study / "depth_0" / "recon.mha"
+    run(study, tmp_path / "1", "--shard", "1/2")
+    frame.write_bytes(frame.read_bytes()[:-1] + b"\1")
+    run(study, tmp_path / "2", "--shard", "2/2")
+    for shard in "12":
+        shutil.copytree(tmp_path / shard, tmp_path / "out", dirs_exist_ok=True)
+    assert f"{frame} was changed between case a and case b" in why_not_pooled(tmp_path / "out")
+    run(study, tmp_path / "3", "--shard", "1/2")
+    shutil.copytree(tmp_path / "3", tmp_path / "out", dirs_exist_ok=True)
+    assert why_not_pooled(tmp_path / "out") == ""
+
+
 @pytest.mark.slow
 def test_shards_of_arrays_of_other_sizes_are_not_pooled(study: Path, tmp_path: Path) -> None:
     """A case of the earlier array lay on top of the later one's, with the error of a scan that had been replaced."""

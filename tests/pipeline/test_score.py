@@ -722,6 +722,20 @@ def test_beside_wires_of_other_cases_a_log_is_no_wire(tmp_path: Path, wires: str
     assert found_for("bend", tmp_path, ["bend", "other"]) == []
 
 
+def test_wires_that_change_places_are_judged_anew(known: Known) -> None:
+    """Files are of the frames that their names count; renamed, with nothing else changed, an old result was kept."""
+    folder = known[0].with_name("places")
+    write_csv(folder, known[1])
+    for n, path in enumerate(sorted(folder.glob("*.csv"))):
+        path.rename(folder / f"{'cbad'[n]}_{n:03d}.csv")
+    code, table, _ = run_with(known, '"places/*.csv"', "placed")
+    assert (code, len(table)) == (0, FRAMES)
+    (folder / "c_000.csv").rename(folder / "c_002.csv")
+    (folder / "a_002.csv").rename(folder / "a_000.csv")
+    code, _, _ = run_with(known, '"places/*.csv"', "placed")
+    assert code == 1, "the wires of two frames are exchanged"
+
+
 def test_where_curves_are_looked_for(known: Known, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     mixed = write_csv(tmp_path / "mixed", known[1])
     write_polyline_vtp(mixed / "a.vtp", known[1][0])
