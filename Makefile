@@ -193,7 +193,7 @@ coverage: setup
 # 100 random changes of product lines, each against the tests that execute them: the share that is noticed (hours)
 mutants: setup
 	$(COVERAGE)
-	$(BIN)/python -m tests.studies.mutants --seed $(SEED) --site $(OUT)/coverage -- -n 2 --dist loadfile -m "not peers"
+	$(BIN)/python -m tests.studies.mutants --seed $(SEED) --site $(OUT)/coverage -- -n 2 --dist loadfile
 
 # scans that nobody would scan, every index of compiled code checked: by itself it reads on beyond an array
 bounds: setup

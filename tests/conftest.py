@@ -29,9 +29,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     met: Counter[str] = Counter()
     for item in items:
         test = item.nodeid.partition("[")[0]
-        for quick in item.iter_markers("quick"):
-            if met[test] >= quick.args[0]:
-                item.add_marker(pytest.mark.slow)
+        if (quick := item.get_closest_marker("quick")) and met[test] >= quick.args[0]:
+            item.add_marker(pytest.mark.slow)
         met[test] += 1
     count = Counter(item.path for item in items)
     place = {name: n for n, name in enumerate(LONGEST)}

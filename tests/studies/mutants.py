@@ -1,12 +1,13 @@
 """Do the tests notice? Random small changes of product lines, each against the tests: ``make mutants``.
 
 A change is drawn with a fixed seed: a comparison, a sum, a product, a condition, a truth value or a number of one line
-becomes its neighbour. Two kinds that change nothing are not drawn: a bound that floats meet by accident alone (`x_mm <
-0.5` or `<=`; at zero they do meet), and `strict=` of zip, which asserts. One run of the tests with coverage tells which
-of them execute the line: the quickest of these run first, up to the first that fails. Kernels, which coverage does not
-see, have the tests that execute what calls them (see ``callers``), and those that name them. The solver's are first
-tried without a compiler, on the kept numbers of its scenes: that takes seconds, compiling it minutes. A change that
-none of its tests fails on has survived, and is printed to be looked at.
+becomes its neighbour. Two kinds that change nothing are not drawn: a bound that floats meet by accident alone (zero,
+which they do meet, apart), and what ``strict`` of zip asserts.
+
+One run of the tests with coverage tells which of them execute the line: the quickest of these run first, up to the
+first that fails. Kernels, which coverage does not see, have the tests that execute what calls them (see ``callers``),
+and those that name them. The solver's are first tried without a compiler, on the kept numbers of its scenes: that takes
+seconds, compiling it minutes. A change that none of its tests fails on has survived, and is printed to be looked at.
 """
 
 from __future__ import annotations
@@ -103,9 +104,9 @@ def mutants_of(path: Path) -> Iterator[Mutant]:
     starts = [0]
     for line in text.splitlines(keepends=True):
         starts.append(starts[-1] + len(line))
-    functions = [n for n in ast.walk(ast.parse(text)) if isinstance(n, (ast.FunctionDef, ast.AsyncFunctionDef))]
-    words = (node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.keyword))
-    seen = {_place(word.value) for word in words if word.arg == "strict"}
+    nodes = [*ast.walk(ast.parse(text))]
+    functions = [n for n in nodes if isinstance(n, (ast.FunctionDef, ast.AsyncFunctionDef))]
+    seen = {_place(n.value) for n in nodes if isinstance(n, ast.keyword) and n.arg == "strict"}
     for node in (inner for function in functions for statement in function.body for inner in ast.walk(statement)):
         new = changed(node) if isinstance(node, ast.expr) else None
         if new is None or not isinstance(node, ast.expr) or _place(node) in seen:
@@ -238,7 +239,7 @@ def main() -> int:
     given = parser.parse_args()
     chosen, possible = drawn(given.count, given.seed, given.below)
     chosen = chosen[given.first :]
-    known, noticed = executed(given.site, given.words), 0
+    known, noticed = executed(given.site, [*ALL, *given.words]), 0
     with ThreadPoolExecutor(given.jobs) as pool:
         for mutant, by in zip(chosen, pool.map(partial(killed, known=known), chosen), strict=True):
             noticed += bool(by)
