@@ -251,13 +251,13 @@ def _inputs(
 ) -> dict[tuple[str, str], str]:
     """Hashes by case and key of the manifest; rows of an older version, which have no key, by their paths.
 
-    Another simulator's wires, of which all files differ where the simulator does, have one hash together. Where some of
-    them alone differ from those ``before``, these are named.
+    Another simulator's wires, of which all files differ where the simulator does, have one hash together, with their
+    names, which count the frames. Where some of them alone differ from those ``before``, these are named.
     """
     hashes: dict[tuple[str, str], str] = {}
     for case in sorted(cases):
         files = _files(found[case])
-        wires = [value for key, (_, value) in files.items() if key.startswith(WIRES)]
+        wires = [f"{name} {value}" for key, (name, value) in files.items() if key.startswith(WIRES)]
         hashes |= {(case, key): value for key, (_, value) in files.items() if not key.startswith(WIRES)}
         if wires:
             together = sha256("".join(wires).encode()).hexdigest()[:12]

@@ -16,7 +16,7 @@ from reports.figures import declared, figures_of
 from reports.figures._drawing import DOTS_PER_INCH, save
 
 R = TypeVar("R")
-LONGEST = "projections", "run_time"
+LONGEST = "projections", "contact_along_wire", "run_time"
 _NIGHT = "0.52 -0.64 -0.48 0 0.69  -0.48 0.36 -0.48 0 0.69  -0.48 -0.64 0.52 0 0.69  0 0 0 1 0"
 """The matrix by which paper becomes the dark page and ink light, while colours stay theirs."""
 

@@ -126,12 +126,13 @@ def _planes_in(folder: Path, wanted: str) -> list[Plane]:
 def read_stack(source: Source) -> Stack:
     """Headers of the one series in a folder, or of one multi-frame file, sorted along the slice normal."""
     names = sorted(source.path.iterdir())[:MOST_FILES] if is_folder(source.path) else [source.path]
-    stamps = tuple((p.name, s.st_size, s.st_mtime_ns) for p in names if p.is_file() for s in [p.stat()])
+    # whoever puts back a file's time cannot put back that of its entry
+    stamps = tuple((p.name, s.st_size, s.st_mtime_ns, s.st_ctime_ns) for p in names if p.is_file() for s in [p.stat()])
     return _stack(source.path, source.dataset, stamps)
 
 
 @lru_cache(maxsize=64)  # asked for twice a frame: for its header, and for its voxels
-def _stack(path: Path, series: str, _stamps: tuple[tuple[str, int, int], ...]) -> Stack:
+def _stack(path: Path, series: str, _stamps: tuple[tuple[str, int, int, int], ...]) -> Stack:
     planes = _planes_in(path, series) if is_folder(path) else _planes_in_file(path)
     _require_uniform(path, planes)
     axes = np.mean([plane.orientation for plane in planes], axis=0).reshape(2, 3).T

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bz2
 import gzip
+import os
 import struct
 import zipfile
 from collections.abc import Callable
@@ -331,6 +332,16 @@ def test_a_damaged_slice_is_named_wherever_it_lies(tmp_path: Path, content: byte
     last.write_bytes(last.read_bytes()[:200] if content is None else content)
     with pytest.raises(LoadError, match=rf"1 of its files cannot be read as DICOM: {last.name}"):
         read_header(tmp_path / "series")
+
+
+def test_slices_that_were_edited_and_given_their_time_back_are_read_anew(tmp_path: Path) -> None:
+    write_series(tmp_path / "series", numbered(), straight_stack())
+    assert read_header(tmp_path / "series").origin_mm[0] == 12.0
+    for path in (tmp_path / "series").iterdir():
+        times = path.stat()
+        path.write_bytes(path.read_bytes().replace(b"12\\-30", b"13\\-30"))
+        os.utime(path, ns=(times.st_atime_ns, times.st_mtime_ns))
+    assert read_header(tmp_path / "series").origin_mm[0] == 13.0
 
 
 def test_an_orientation_that_is_written_with_one_decimal_is_taken_as_such(tmp_path: Path) -> None:

@@ -169,6 +169,20 @@ def test_of_a_simulators_wires_the_file_that_changed_is_named(second: Path, tmp_
     assert row["after"].endswith("; other: wire_2.csv")
 
 
+def test_wires_whose_files_were_renamed_are_other_inputs(second: Path, tmp_path: Path) -> None:
+    """A file's name counts the frame that its wire is held against."""
+    other = shutil.copytree(second, tmp_path / "other")
+    for out, names in ((second, "01"), (other, "12")):
+        path = out / "cases" / "a" / "result.json"
+        wires = [
+            {"key": f"simulated.files[{i}]", "path": f"wire_{n}.csv", "sha256": str(i) * 64}
+            for i, n in enumerate(names)
+        ]
+        result = json.loads(path.read_text(encoding="utf-8"))
+        path.write_text(json.dumps(result | {"inputs": wires}), encoding="utf-8")
+    assert [row["what"] for row in what_differs(second, other)] == ["input of a: simulated.files"]
+
+
 def test_the_verdict_follows_what_differs_and_ends_the_text(
     first: Path, second: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

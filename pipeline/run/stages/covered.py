@@ -28,10 +28,11 @@ voxels is up to half a voxel farther from it than they say."""
 def too_thick(what: str, radius_mm: float, lines: Mapping[int, Array], wall: VesselWall) -> list[str]:
     """A warning where the lumen has no room for a wire or a catheter. lines : where it lies, (n, 3) by frame."""
     least, where, count = np.inf, "", 0
-    for frame, points in lines.items():
-        if not len(points) or radius_mm == 0.0:
-            continue
-        room = room_mm(wall, points, radius_mm)
+    lies = {frame: points for frame, points in lines.items() if len(points) and radius_mm > 0.0}
+    ends = np.cumsum([len(points) for points in lies.values()])
+    # of all frames at once: the wall is looked up 33 times, and not as often for each
+    rooms = np.split(room_mm(wall, np.concatenate([*lies.values()]), radius_mm), ends[:-1]) if lies else []
+    for (frame, points), room in zip(lies.items(), rooms, strict=True):
         worst = int(np.argmin(room))
         count += bool(radius_mm > room[worst] + NARROWER_VOXELS * float(np.max(wall.distance.spacing_mm)))
         if room[worst] < least:

@@ -48,7 +48,9 @@ def own_gaps(frames: Sequence[Frame], voxel_mm: float) -> tuple[list[Frame], lis
     for n in np.flatnonzero(agreed):
         out[with_gap[n]] = out[with_gap[n]].cleared(curves[n].without(BEYOND_GAP))
     out, touching = _left_behind(_faced(out, voxel_mm), voxel_mm)
-    out = [_past_marks(frame, frames, voxel_mm) for frame in out]
+    curved = [(f.index, f.curve) for f in frames if f.curve is not None]
+    marked = [(curve.length_mm, index, curve.marks_mm) for index, curve in curved if len(curve.marks_mm)]
+    out = [_past_marks(frame, marked, voxel_mm) for frame in out]
     odd = [f"{out[with_gap[n]].index} ({beyond[n]:.1f} mm)" for n in np.flatnonzero(~agreed) if out[with_gap[n]].ok]
     said = touching + _pushed_along([out[with_gap[n]] for n in np.flatnonzero(with_tip & ~stays)])
     if not odd:
@@ -152,10 +154,11 @@ def _lay_there(curve: Curve, other: Curve, voxel_mm: float) -> bool:
     return bool(np.mean(off < STAYED_VOXELS * voxel_mm) * (arc[-1] - ends_mm) > STAYED_MM)
 
 
-def _past_marks(frame: Frame, frames: Sequence[Frame], voxel_mm: float) -> Frame:
+def _past_marks(frame: Frame, marked: Sequence[tuple[float, int, Array]], voxel_mm: float) -> Frame:
     """The frame; failed where its curve ends at a mark that stands there in frames of two smaller depths.
 
     One frame alone may show its own tip beyond what is not seen of its wire; a catheter that is stated explains it.
+    marked : length of wire, mm, number, and marks (n, 3), LPS mm, of all frames that show some.
     """
     curve = frame.trusted_curve
     if curve is None or frame.catheter_mm > 0.0:
@@ -163,11 +166,9 @@ def _past_marks(frame: Frame, frames: Sequence[Frame], voxel_mm: float) -> Frame
     arc = arc_length(curve.points_mm)
     end = cKDTree(curve.points_mm[arc > arc[-1] - END_MM])
     seen = {
-        other.curve.length_mm: other.index
-        for other in frames
-        if other.curve is not None
-        and other.curve.length_mm < curve.length_mm - CAME_NEARER_MM
-        and np.any(end.query(other.curve.marks_mm)[0] < STAYED_VOXELS * voxel_mm)
+        length_mm: number
+        for length_mm, number, marks in marked
+        if length_mm < arc[-1] - CAME_NEARER_MM and np.any(end.query(marks)[0] < STAYED_VOXELS * voxel_mm)
     }
     if not seen or max(seen) - min(seen) < CAME_NEARER_MM:
         return frame
