@@ -276,14 +276,16 @@ def test_scans_further_down_are_named(tmp_path: Path, monkeypatch: pytest.Monkey
 
 def test_folders_that_look_like_cases_are_no_frames_of_one(tmp_path: Path) -> None:
     """Frames of three insertions were to be moved into one folder."""
-    for name in ("ins1", "ins2", "ins3"):
+    for name in ("ins1", "ins2", "ins3", "ins4"):
         (tmp_path / name / "frames").mkdir(parents=True)
         for scan in ("reference.mha", "frames/d22.mha"):
             (tmp_path / name / scan).touch()
     with pytest.raises(LoadError) as error:
         infer_manifest(tmp_path, None, None, None, LoadConfig())
     here, said = tmp_path.name, str(error.value)
-    assert f"{here} holds 3 folders that look like cases: ins1, ins2, ins3; run `wireval init` on" in str(error.value)
+    assert f"{here} holds 4 folders that look like cases: ins1, ins2, ins3 and 1 more; run `wireval init`" in str(
+        error.value
+    )
     assert f"into one {here}/manifest.toml, with ins1/ and so on before their paths" in said
     assert "move" not in said
 

@@ -636,6 +636,7 @@ def test_what_is_wrong_with_all_is_refused(known: Known, tmp_path: Path, capsys:
         ("bare", write_csv(tmp_path / "bare", wires, "x,y,z"), "space and unit are not stated"),
         ("cm", write_csv(tmp_path / "cm", wires, "# unit: cm\nx,y,z"), "space is not stated and will not be guessed"),
         ("unit", write_csv(tmp_path / "unit", wires, "# space: LPS\nx,y,z"), "unit is not stated"),
+        ("lines", tmp_path / "bare", "or write '# space: LPS' and '# unit: mm' above the table"),
         ("feet", write_csv(tmp_path / "feet", wires, "# space: LPS\n# unit: ft\nx,y,z"), "lengths in 'ft'"),
         ("five", write_csv(tmp_path / "five", [*wires, wires[-1]]), "5 files, wire_000.csv to wire_004.csv, for 4"),
         ("late", write_csv(tmp_path / "late", wires[1:3], first=1), "not known which belongs to which"),
