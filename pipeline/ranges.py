@@ -157,3 +157,12 @@ def _visible(value: Any) -> Any:
 
 Name = Annotated[str, BeforeValidator(_visible)]
 """What people call a group, or a phantom."""
+
+
+def _on_one_line(value: Any) -> Any:
+    """A sentence, its lines joined; ValueError as for a name: what a terminal obeys is not handed on to one."""
+    return _visible(" ".join(value.split()) if isinstance(value, str) else value)
+
+
+Sentence = Annotated[str, BeforeValidator(_on_one_line)]
+"""What a user says of a case, for the pages and the terminal."""

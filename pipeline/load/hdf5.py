@@ -5,7 +5,9 @@ A dataset's attributes give spacing_mm (needed), origin_mm (default 0), directio
 The datasets of a group come in natural order, and each one's geometry is compared with that of the first.
 """
 
+import re
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +15,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.arrays.polyline import UNITS_MM
 from pipeline.load.config import LoadConfig
 from pipeline.load.geometry import Box, Header, Source, judged, require_same_geometry, unusable
 from pipeline.load.guard import require_room
@@ -21,6 +24,9 @@ from pipeline.load.voxels import LONGEST_AXIS
 
 AXES = ("z,y,x", "x,y,z")
 MOST_NAMES = 20
+ATTRIBUTES = {"coordinates": "space", "space": "space", "length_unit": "unit", "units": "unit", "unit": "unit"}
+"""By which a file, a group or a dataset in it states space and unit of length."""
+_OTHER_SPACE = re.compile(r"^(?!lps)[rl][ap][si]\b|right|anterior|inferior|ijk|index|(?:vox|pix)el", re.IGNORECASE)
 
 
 def _volumes(file: h5py.File, source: Source) -> list[h5py.Dataset]:
@@ -81,6 +87,15 @@ def inside(group: h5py.Group, name: str, source: Source) -> Any:
     return node
 
 
+def require_usual(what: object, *stating: h5py.HLObject) -> None:
+    """LoadError where the file, or something in it, states another space or unit of length than LPS mm."""
+    for held, (name, of) in product(stating, ATTRIBUTES.items()):
+        said = text_of(held.attrs.get(name, ""))
+        if _OTHER_SPACE.search(said) or (of == "unit" and UNITS_MM.get(said.lower().strip("[]() "), 1.0) != 1.0):
+            where = f"{held.name}: attribute {name} is {said!r}"
+            raise unusable(what, f"{where}; allowed in HDF5: LPS mm; convert the numbers, and the attribute")
+
+
 def _attribute(source: Source, data: h5py.Dataset, name: str, default: Any, allowed: str) -> Any:
     """An attribute's value, the default where there is none; LoadError for one without a value."""
     found = data.attrs.get(name, default)
@@ -124,6 +139,7 @@ def read_header(source: Source, config: LoadConfig) -> Header:
         raise unusable(source, f"{kind}. Check that the file is complete: copy it again.") from None
     with file:
         volumes = _volumes(file, source)
+        require_usual(source, file, volumes[0].parent, *volumes)
         headers = [_header(source, data, config) for data in volumes]
         for header, data in zip(headers, volumes, strict=True):
             if len(headers) > 1:

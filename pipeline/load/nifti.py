@@ -68,7 +68,7 @@ def head_of(path: Path) -> Head:
     begin = float(fields["vox_offset"])
     if not np.isfinite(begin) or begin != int(begin) or not (int(fields["size"]) + 4 if whole else 0) <= begin < 2**40:
         raise unusable(path, f"vox_offset {begin:g}; allowed: a whole number beyond the header; correct the header")
-    order = fields["size"].dtype.byteorder
+    order = fields.dtype["size"].byteorder  # of the record: a number taken out of it is in this machine's order
     (spacing, origin, direction), assumed = _geometry(path, fields, np.array(shape))
     packing = packing if whole else _packing(data)
     if packing:  # the offset counts unpacked bytes

@@ -60,7 +60,11 @@ def _axes(path: Path, fields: dict[str, str]) -> Axes:
     sizes = [int(n) for n in numbers(path, fields, "sizes", count, whole=True)]
     vectors = _vectors(path, fields, count)
     kinds = fields.get("kinds", "").lower().split() or ["domain"] * count
-    leading = count == 4 and (vectors[0] is None if any(v is None for v in vectors) else kinds[0] not in DOMAINS)
+    without = [n for n, vector in enumerate(vectors) if vector is None]
+    leading = count == 4 and (without[0] == 0 if without else kinds[0] not in DOMAINS)
+    if count == 4 and not leading and (without not in ([], [3]) or kinds[-1] not in (*DOMAINS, "list")):
+        got = f"space directions {fields.get('space directions', '')[:80]!r} and kinds {fields.get('kinds', '')[:80]!r}"
+        raise unusable(path, f"{got}; allowed: three axes in space, then one that counts volumes; save it again")
     shape, items = axes_of(path, sizes[1:] if leading else sizes)
     return Axes(shape, items, sizes[0] if leading else 1, [v for v in vectors if v is not None], leading)
 
@@ -92,6 +96,10 @@ def head_of(path: Path) -> Head:
 
 
 ALIAS = {"datafile": "data file", "lineskip": "line skip", "byteskip": "byte skip"}
+FIELDS = (
+    "type", "dimension", "sizes", "endian", "encoding", "space", "space dimension", "space directions", "space origin",
+    "space units", "spacings", "units", "kinds", "byte skip", "line skip", *ALIAS,
+)  # fmt: skip
 DOMAINS = ("domain", "space", "time", "???", "none")
 
 
@@ -109,6 +117,7 @@ def _fields(path: Path) -> tuple[dict[str, str], int]:
     for n, line in enumerate(lines[1:], 2):
         name, colon, value = line.partition(":")
         if colon and not line.startswith("#"):
+            _require_a_field(path, name, value)
             key = name if value.startswith("=") else ALIAS.get(name.strip().lower(), name.strip().lower())
             value = value.removeprefix("=").strip()
             if fields.setdefault(key, value) != value:
@@ -117,6 +126,13 @@ def _fields(path: Path) -> tuple[dict[str, str], int]:
                 fields[key] = "\n".join((value, *lines[n:]))
                 break
     return fields, end
+
+
+def _require_a_field(path: Path, name: str, value: str) -> None:
+    """LoadError for a pair key:=value, which says nothing of the voxels, that has the name of a field, which does."""
+    if value.startswith("=") and name.strip().lower() in FIELDS:
+        what = f"{name.strip()}:={value[1:41]} is a key/value pair, which readers pass over"
+        raise unusable(path, f"{what}; allowed: {name.strip()}: {value[1:].strip()[:40]}; correct the header")
 
 
 def _byte_skip(path: Path, fields: dict[str, str], packing: str) -> int:
@@ -178,7 +194,8 @@ def _vectors(path: Path, fields: dict[str, str], count: int) -> list[NDArray[Any
 def _geometry(path: Path, fields: dict[str, str], vectors: list[Any], leading: int) -> tuple[Placed, tuple[str, ...]]:
     """Spacing, origin and direction in LPS mm, and what of it the header lacks."""
     space = fields.get("space", "").lower().removesuffix("-time")
-    lacks = [] if space in TO_LPS else ["space: left-posterior-superior"]
+    lacks = [] if space in TO_LPS else [f"axes of the body in its space {space!r}: left-posterior-superior"]
+    lacks = lacks if space else ["space: left-posterior-superior"]
     if space and space not in TO_LPS and space not in ("scanner-xyz", "3d-right-handed", "3d-left-handed"):
         raise unusable(path, f"space: {space!r}; allowed: {', '.join(n for n in TO_LPS if '-' in n)}; save it again")
     flip = np.array(TO_LPS.get(space, (1, 1, 1)), float)
@@ -190,7 +207,8 @@ def _geometry(path: Path, fields: dict[str, str], vectors: list[Any], leading: i
         lacks += ["direction: along x, y, z"] + ["spacing: 1 mm"] * ("spacings" not in fields)
         words = fields.get("spacings", "1 1 1" if not leading else "1 1 1 1").split()[leading:][:3]
         columns = np.diag(numbers(path, {"spacings": " ".join(words)}, "spacings", 3))
-    units = re.findall(r'"([^"]*)"', fields.get("space units", "") or fields.get("units", ""))
+    stated = fields.get("space units", "") or fields.get("units", "")
+    units = re.findall(r'"([^"]*)"', stated) or stated.split()  # unquoted ones were passed over: cm as mm
     named = [unit for unit in units if unit.strip()][:3] or ["mm"]
     if len(set(named)) > 1:
         raise unusable(path, f"units {named} differ between the axes; allowed: one unit for all; convert the file")

@@ -4,10 +4,8 @@ What a file's numbers mean is stated, by the file, its format or whoever names i
 or RAS that is taken for mm and LPS is another wire. A frame without a usable wire is known as such and by its reason.
 """
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +16,7 @@ from pipeline.arrays.polyline import UNITS_MM
 from pipeline.load.curves import READERS, distinct, points_in_table
 from pipeline.load.geometry import LoadError, Source, refused, unusable
 from pipeline.load.guard import size_of
-from pipeline.load.hdf5 import inside, require_written, text_of
+from pipeline.load.hdf5 import inside, require_usual, require_written, text_of
 from pipeline.load.order import last_counts
 from pipeline.load.outside import millimetres, to_whole
 from pipeline.load.stated import stated_in, stated_in_table
@@ -38,9 +36,6 @@ MOST_POINTS = 1_000_000
 """Of one wire in a HDF5 file: a few packed kB may stand for more than there is memory."""
 USUAL = {"space": "LPS", "unit": "mm"}
 """What is stated of coordinates, in the order of ``stated_in``, and what most have."""
-ATTRIBUTES = {"coordinates": "space", "space": "space", "length_unit": "unit", "units": "unit", "unit": "unit"}
-"""By which a HDF5 file, a group or a dataset in it states them."""
-_OTHER_SPACE = re.compile(r"^(?!lps)[rl][ap][si]\b|right|anterior|inferior|ijk|index|(?:vox|pix)el", re.IGNORECASE)
 _JUDGED = "UNDER_RESOLVED", "SELF_CONTACT", "SIMULATE_FAILED", "CURVE_UNUSABLE", "NOT_TO_DEPTH"
 REFUSED = {s.identifier: s.value for s in (*Status, *map(FrameStatus.__getitem__, _JUDGED)) if s != Status.CONVERGED}
 """Sentences on wires that a run refuses, by the status of their frames; other statuses are of traces."""
@@ -126,7 +121,7 @@ def _in_hdf5(path: Path, count: int, space: str, unit: str) -> list[OtherFile]:
             groups = _by_number(path, frames)
             held = {n: inside(group, "simulated_mm", Source(path)) for n, group in groups.items()}
             wires = {n: wire for n, wire in held.items() if wire is not None}
-            _require_usual(path, file, frames, *groups.values(), *wires.values())
+            require_usual(path, file, frames, *groups.values(), *wires.values())
             points = {n: _written(path, wire) for n, wire in wires.items()}
             said = {n: text_of(groups[n].attrs.get("status", "")).lower() for n in wires}
     except (OSError, KeyError, ValueError, AttributeError, TypeError, RuntimeError) as error:
@@ -140,15 +135,6 @@ def _in_hdf5(path: Path, count: int, space: str, unit: str) -> list[OtherFile]:
     own = {n: (s, REFUSED[s], "") for n, s in said.items() if s in REFUSED} | _refused_beside(path)
     found = {n: replace(file, refused=own.get(n, file.refused)) for n, file in read.items()}
     return [found.get(n, missing) for n in range(count)]
-
-
-def _require_usual(path: Path, *stating: h5py.HLObject) -> None:
-    """LoadError where the file, or something in it, states another space or unit than its layout has."""
-    for held, (name, what) in product(stating, ATTRIBUTES.items()):
-        said = text_of(held.attrs.get(name, ""))
-        if _OTHER_SPACE.search(said) or (what == "unit" and UNITS_MM.get(said.lower().strip("[]() "), 1.0) != 1.0):
-            where = f"{held.name}: attribute {name} is {said!r}"
-            raise unusable(path, f"{where}; the layout of frames.h5 is LPS mm; convert the points, or write CSV files")
 
 
 def _refused_beside(wires: Path) -> dict[int, tuple[str, ...]]:

@@ -34,6 +34,7 @@ from pipeline.ranges import (
     Point,
     Positive,
     Roll,
+    Sentence,
     Sigma,
     Spread,
     Strict,
@@ -50,8 +51,7 @@ def _wire(value: Any, info: ValidationInfo) -> Wire:
     wires: dict[str, Wire] = (info.context or {}).get("wires", {})
     if not isinstance(value, str) or value not in wires:
         problem = f"wire {shortened(as_toml(value))} is not among [wires.*]; {did_you_mean(str(value), wires)}"
-        # where the wires themselves are wrong, that is all there is to say
-        raise saying(*[problem] * bool(wires))
+        raise saying(*[problem] * bool(wires))  # where the wires themselves are wrong, that is all there is to say
     return wires[value]
 
 
@@ -74,7 +74,7 @@ class Case(Strict):
 
     id: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$", max_length=LONGEST_NAME, json_schema_extra=IDS)]
     role: Literal["validation", "calibration"] = "validation"
-    assumed: tuple[Annotated[str, Field(min_length=1, max_length=1000)], ...] = ()
+    assumed: tuple[Annotated[Sentence, Field(min_length=1, max_length=1000)], ...] = ()
     group: Name = Field(default_factory=lambda data: data.get("id", ""), min_length=1, max_length=200)
     phantom: Name = Field("", max_length=200)
     reference: SourceText | None = None

@@ -302,6 +302,22 @@ def test_a_damaged_hdf5_file_is_said(tmp_path: Path) -> None:
         read_header(path)
 
 
+@pytest.mark.parametrize("where", ["volume", "/"])
+@pytest.mark.parametrize(("name", "said"), [("space", "RAS"), ("units", "cm"), ("coordinates", "voxel index")])
+def test_a_volume_in_hdf5_that_states_another_space_or_unit_is_refused(
+    tmp_path: Path, where: str, name: str, said: str
+) -> None:
+    """Its numbers were taken for LPS mm, as they would be without the attribute."""
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["volume"] = numbered().T
+        file["volume"].attrs.update(spacing_mm=SPACING, space="LPS", unit="mm")
+    assert read_header(tmp_path / "a.h5").shape == numbered().shape
+    with h5py.File(tmp_path / "a.h5", "a") as file:
+        file[where].attrs[name] = said
+    with pytest.raises(LoadError, match=f"attribute {name} is '{said}'; allowed in HDF5: LPS mm"):
+        read_header(tmp_path / "a.h5")
+
+
 def write_series(folder: Path, values: np.ndarray, positions: list[tuple[float, float, float]]) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     writer = sitk.ImageFileWriter()

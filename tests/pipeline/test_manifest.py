@@ -16,7 +16,7 @@ from pydantic import TypeAdapter, ValidationError
 from pipeline.load import Header, LoadError, Source, read_header
 from pipeline.load.curves import read_truth
 from pipeline.model import Array
-from pipeline.ranges import Name
+from pipeline.ranges import Name, Sentence
 from pipeline.study.check import check
 from pipeline.study.devices import implausible
 from pipeline.study.manifest import ManifestError, read_manifest
@@ -583,6 +583,15 @@ def test_another_voxel_size_than_the_scan_states_is_doubted(tmp_path: Path, spac
     found = other_voxels(read_header(path, spacing_mm=(0.5, 0.5, 5.0)))
     assert len(found) == said
     assert all("where the file has [0.5, 0.5, 0.5]; is that meant?" in text for text in found)
+
+
+def test_what_is_assumed_is_a_line_that_no_terminal_obeys() -> None:
+    """Such a sentence cleared the screen and named the window, by `check`, and stood in the pages."""
+    sentence: TypeAdapter[str] = TypeAdapter(Sentence)
+    assert sentence.validate_python(" wall:\n\t1 N/mm2\u2009\u2248 soft ") == "wall: 1 N/mm2 \u2248 soft"
+    for text in ("\x1b[2Jwall", "wall\u202e", "wall\x07"):
+        with pytest.raises(ValidationError, match="has characters that are not seen"):
+            sentence.validate_python(text)
 
 
 def test_names_that_look_alike_are_one_or_refused() -> None:

@@ -14,7 +14,7 @@ from tests.studies.formats.base import TURN, Variant, by_itk, cut, numbered
 FORMS, QFORM, SFORM, UNITS, PIXDIM, SLOPE, DIM, SROW = 252, 252, 254, 123, 76, 112, 40, 280
 
 
-def nifti(*fields: tuple[int, str, object], packed: bool = False, big: bool = False) -> Callable:
+def nifti(*fields: tuple[int, str, object], packed: bool = False) -> Callable:
     """A NIfTI-1 file of the scan with fields (byte, struct format, value) written over."""
 
     def write(folder: Path) -> Path:
@@ -27,6 +27,18 @@ def nifti(*fields: tuple[int, str, object], packed: bool = False, big: bool = Fa
         return name
 
     return write
+
+
+HEADER = "i10s18sih2s8h3f4h8f3fh2s4f2i80s24s2h6f12f16s4s"
+
+
+def big_endian(folder: Path) -> Path:
+    """The scan as machines with the other order of bytes write it."""
+    path = by_itk("a.nii")(folder)
+    raw = path.read_bytes()
+    head = struct.pack(">" + HEADER, *struct.unpack_from("<" + HEADER, raw))
+    path.write_bytes(head + raw[348:352] + numbered().T.astype(">i2").tobytes())
+    return path
 
 
 def nifti_variants() -> Iterator[Variant]:
@@ -51,6 +63,7 @@ def nifti_variants() -> Iterator[Variant]:
     yield Variant("nii, unit 7", nifti((UNITS, "B", 7)), "!unit")
     yield Variant("nii, slope 2 and intercept -5", nifti((SLOPE, "ff", (2.0, -5.0))), values=2 * numbered() - 5)
     yield Variant("nii, slope 0.5", nifti((SLOPE, "ff", (0.5, 0.0))), values=numbered() / 2)
+    yield Variant("nii, big-endian", big_endian)
     yield Variant("nii, slope nan", nifti((SLOPE, "ff", (float("nan"), 0.0))))
     yield from nifti_others()
 

@@ -20,6 +20,13 @@ def nrrd_variants() -> Iterator[Variant]:
     yield Variant("nrrd, in furlong", changed(plain, ("endian", units.format("furlong"))), "!furlong")
     metres = changed(plain, ("endian", units.format("cm")))
     yield Variant("nrrd, in cm", metres, spacing=10 * SPACING, origin=10 * ORIGIN)
+    unquoted = changed(plain, ("endian", "space units: cm cm cm\nendian"))
+    yield Variant("nrrd, in cm without quotes", unquoted, spacing=10 * SPACING, origin=10 * ORIGIN)
+    for pair in ("space units:=cm cm cm", "Space:=right-anterior-superior", "endian:=big"):
+        yield Variant(f"nrrd, the pair {pair}", changed(plain, ("endian", f"{pair}\nendian")), "!key/value pair")
+    yield Variant(
+        "nrrd, a space of no body", changed(plain, ("left-posterior-superior", "3D-left-handed")), "left-handed"
+    )
     ras = changed(plain, ("left-posterior-superior", "right-anterior-superior"))
     flip = np.array([-1.0, -1.0, 1.0])
     yield Variant("nrrd, RAS", ras, origin=flip * ORIGIN, direction=flip[:, None] * TURN)
@@ -51,6 +58,12 @@ def nrrd_others() -> Iterator[Variant]:
     yield Variant(
         "nrrd, 4-D, second volume", sequence("a.nrrd"), "space", values=numbered() + 1, direction=np.eye(3), item=1
     )
+    for name, vectors, kinds in (
+        ("colours", "(0.4,0,0) (0,0.5,0) (0,0,0.7) none", "domain domain domain RGB-color"),
+        ("of volumes in between", "(0.4,0,0) none (0,0.5,0) (0,0,0.7)", "domain list domain domain"),
+    ):
+        four = changed(sequence("a.nrrd"), ("space directions:", vectors), ("kinds:", kinds))
+        yield Variant(f"nrrd, an axis {name}", four, "!counts volumes")
     yield Variant("mha, 4-D, second volume", sequence("a.mha"), values=numbered() + 1, direction=np.eye(3), item=1)
     yield Variant(
         "nii.gz, 4-D, second volume", sequence("a.nii.gz"), values=numbered() + 1, direction=np.eye(3), item=1
