@@ -39,7 +39,7 @@ def render_case(case_dir: Path, embed: bool = False, each: Each = one_by_one) ->
         "badge": badge(result.get("status", "no result.json"), result.get("status") in GOOD, _scored(case), caveats),
         **_case_verdict(case, caveats),
         "worst": worst_frames({case.name: errors}, {}),
-        "next": next_command([case.name], typed(case_dir)),
+        "next": next_command([case.name], typed(case_dir), [result.get("status", "")]),
         **_drawn(case, embed, each),
         **{key: result.get(key, "") for key in ("role", "group", "simulator")},
         "failures": alike(failures),

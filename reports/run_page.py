@@ -65,8 +65,11 @@ def render_index(out_dir: Path, embed: bool = False, each: Each = one_by_one) ->
         **_judged(out_dir, cases, first_that_holds(why), row, why_none, one_case(summary.to_dict("records"))),
         **_worse_cases(summary, links),
         "worst": worst_frames({n: t for n, t in files.errors.items() if n not in uncounted}, links),
-        # of several shards' commands none is the one of the run
-        "next": next_command([*(f["case"] for f in failures), *missing], typed(out_dir) if len(infos) == 1 else ()),
+        "next": next_command(
+            [*(f["case"] for f in failures), *missing],
+            typed(out_dir) if len(infos) == 1 else (),  # of several shards' commands none is the one of the run
+            [f["status"] for f in failures],
+        ),
         "failures": alike(failures),
         "beside_others": (out_dir / SIMULATORS.file).exists(),
         **aside,

@@ -13,8 +13,8 @@ from reports.doubts import doubted, said_by_cases, weightiest_first
 from reports.records import read_json
 
 _MANY = 5
-_NOT_AGAIN = "--only", "--case-timeout", "--case-memory"
-"""Options that the next command leaves out: other cases are meant, and a limit that stopped one stops it again."""
+_LIMITS = "--case-timeout", "--case-memory"
+"""Options that the next command leaves out where they stopped a case: they would again."""
 
 
 def worst_frames(tables: Mapping[str, pd.DataFrame], links: Mapping[str, str]) -> list[dict[str, Any]]:
@@ -48,18 +48,20 @@ def typed(folder: Path, name: str = "provenance.json") -> Sequence[str]:
     return [str(word) for word in words] if isinstance(words, list) else ()
 
 
-def next_command(cases: Iterable[str], typed: Sequence[str] = ()) -> str:
+def next_command(cases: Iterable[str], typed: Sequence[str] = (), statuses: Iterable[str] = ()) -> str:
     """The command that computes these cases again once what the messages say has been done.
 
     typed : the command of this run; where it is not known, MANIFEST and OUT stand for its arguments. More than a few
     cases are not named, since what is finished is kept anyway; ``score`` names none and keeps it without being asked.
+    statuses : of what failed.
     """
     if list(typed[:2]) == ["wireval", "score"]:
         return shlex.join(word for word in typed if word != "--fresh")
     named = list(dict.fromkeys(cases))
     only = [word for case in named for word in ("--only", case)] if len(named) <= _MANY else []
     head = list(typed) if list(typed[:2]) == ["wireval", "run"] else ["wireval", "run", "MANIFEST", "-o", "OUT"]
-    kept, words, left_out = [], iter(head), (*_NOT_AGAIN, *("--shard",) * bool(only))
+    limits = _LIMITS if "over_limit" in statuses else ()
+    kept, words, left_out = [], iter(head), ("--only", *limits, *("--shard",) * bool(only))
     for word in words:
         name, equals, _ = word.partition("=")
         if name in left_out:

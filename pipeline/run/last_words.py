@@ -1,8 +1,9 @@
 """What a run says when it is done: what went wrong and what comes next, the numbers, where the report lies."""
 
 import shlex
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -30,18 +31,18 @@ def failure_lines(plan: Plan, then: str = "") -> list[str]:
 
     then : what comes next, where it is not the run's own command for these cases.
     """
-    found, cases = found_results(plan.out), []
+    found = found_results(plan.out)
+    failed = [row for result in found for row in result.failures]
     lines = [*filter(None, [why_not_pooled(plan.out)]), *shared_scans(found)]
     for result in found:
-        cases += [row["case"] for row in result.failures]
         lines += map(line_of, alike(result.failures))
     heads = heads_of(plan.template.settings, plan.cases, plan.points)
     lines += lost_lines(lost_points(plan.out, heads))
     lines += silent_points(read_if_there(plan.out / SWEEP.file, SWEEP))
-    then = then or _next(plan, cases)
+    then = then or _next(plan, failed)
     worse = worse_sentence([{**result.summary, "role": result.role} for result in found])
     aside = [*filter(None, [left_over_sentence(plan.out), worse])]
-    return [*aside, *lines, f"next: {then}"] if cases else [*aside, *lines]
+    return [*aside, *lines, f"next: {then}"] if failed else [*aside, *lines]
 
 
 def lost_lines(lost: Sequence[tuple[Path, Result]]) -> list[str]:
@@ -49,9 +50,9 @@ def lost_lines(lost: Sequence[tuple[Path, Result]]) -> list[str]:
     return [f"{folder}: {result.case}: {result.status}: {result.failures[0]['message']}" for folder, result in lost]
 
 
-def _next(plan: Plan, cases: Sequence[str]) -> str:
+def _next(plan: Plan, failed: Sequence[Mapping[str, Any]]) -> str:
     """What to do about failures; where the manifest was inferred, it must first be written to be corrected."""
-    again = next_command(cases, command_line())
+    again = next_command((row["case"] for row in failed), command_line(), {row["status"] for row in failed})
     if plan.inferred_from is None:
         return f"see to what the messages name, then {again}"
     folder = shlex.quote(str(plan.inferred_from))

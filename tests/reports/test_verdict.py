@@ -353,7 +353,11 @@ def test_the_next_command_names_the_cases_and_forgets_what_would_widen_or_redo()
         "-j",
         "2",
     ]
-    assert next_command(["a b", "c", "c"], typed) == "wireval run m.toml -o out -j 2 --only 'a b' --only c --resume"
+    named = "-j 2 --only 'a b' --only c --resume"
+    assert next_command(["a b", "c", "c"], typed, ["over_limit"]) == f"wireval run m.toml -o out {named}"
+    # a limit that stopped no case is kept: on a cluster it is why a hanging one ends
+    limits = "--case-timeout 3 --case-memory=9"
+    assert next_command(["a b", "c"], typed, ["load_failed"]) == f"wireval run m.toml -o out {limits} {named}"
     assert next_command(["c"], ["python", "my_script.py"]) == "wireval run MANIFEST -o OUT --only c --resume"
     assert next_command("abcde").count("--only") == 5
     assert "--only" not in next_command("abcdef")
