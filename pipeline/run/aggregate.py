@@ -3,6 +3,7 @@
 Also a JUnit summary for CI: one test per frame, so that a build server shows which frame failed and why.
 """
 
+import re
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
@@ -180,9 +181,13 @@ def _judged(
     return {asked: with_page(why, pages.get(why, ""), out) for asked, why in told.items()}, opened
 
 
+_OVER_FRAMES = re.compile(r"_(?:median|max|low|high|fraction)(?=_|$)")
+"""What a column of overall.csv says of how it sums up that of the frames: tip_max_mm is the largest tip_mm."""
+
+
 def _worst(scored: Sequence[Found], column: str) -> tuple[str, str]:
     """Which frame is the worst by a column of overall.csv, and its page below OUT; empty for what no frame has."""
-    name = column.replace("_median", "")
+    name = column if column in ERRORS.names else _OVER_FRAMES.sub("", column)
     if name not in ERRORS.names or not ERRORS[name].better:
         return "", ""
     sign = -1.0 if ERRORS[name].better == "high" else 1.0

@@ -258,10 +258,12 @@ def test_a_run_gives_frames(study: Path, tmp_path: Path) -> None:
     with pytest.warns(UserWarning, match="errors.csv is not as it was written"):
         altered = wireval.read_results(tmp_path / "out")
     assert (altered.ok, altered.damaged, len(altered.errors), len(altered.points)) == (False, ("straight",), 0, 0)
-    again = wireval.run(study, tmp_path / "out", fail_if=["rms_mm>0.001", "rms_mm>9"], resume=True, **kept)
+    asked = ["rms_mm>0.001", "rms_mm>9", "tip_max_mm>1e-6", "rms_high_mm<9"]
+    again = wireval.run(study, tmp_path / "out", fail_if=asked, resume=True, **kept)
     assert not again.ok, "a closed gate was seen on the terminal alone"
-    assert len(again.closed) == 1
     assert "--fail-if rms_mm>0.001" in again.closed[0]
+    assert re.search(r"tip_max_mm is .*; the worst: case straight frame \d \(tip_mm 0", again.closed[1])
+    assert len(again.closed) == 3
     rms_mm = results.errors["rms_mm"]
     worst = (
         f"; the worst: case straight frame {rms_mm.argmax()} (rms_mm {rms_mm.max():.4g}), cases/straight/report.html"
