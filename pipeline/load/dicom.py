@@ -20,7 +20,7 @@ from pipeline.load.geometry import Box, Header, LoadError, Source, unusable
 from pipeline.load.guard import is_folder, require_room
 from pipeline.load.order import in_order
 from pipeline.load.slices import Plane, dataset, grey, is_dicom, is_image, off_unit, planes_of
-from pipeline.load.voxels import read_box, scaled
+from pipeline.load.voxels import scaled
 
 GAP_TOLERANCE, OFF_GRID = 0.01, 0.05
 """Of the slice spacing: how far a gap may be off, or each slice from a regular grid (positions of few digits)."""
@@ -242,39 +242,19 @@ def read(header: Header, box: Box, _config: LoadConfig) -> NDArray[Any]:
 
 
 def _planes(planes: tuple[Plane, ...]) -> NDArray[Any]:
-    """Whole planes as grey values, indexed x, y, z."""
-    if any(plane.pixels.offset < 0 for plane in planes):
-        return _unpacked(planes)
+    """Whole planes as grey values, indexed x, y, z; packed ones are unpacked to stored values first, and read alike."""
     kinds = {np.dtype(plane.pixels.kind).newbyteorder("=") for plane in planes}
     one = len({(plane.slope, plane.intercept) for plane in planes}) == 1
     rows, columns = planes[0].pixels.rows, planes[0].pixels.columns
     out = np.empty((len(planes), rows, columns), kinds.pop() if one and len(kinds) == 1 else np.float32)
-    for target, plane in zip(out, planes, strict=True):
-        p = plane.pixels
-        place = p.offset + plane.frame * p.frame_bytes
-        stored = grey(plane, np.fromfile(plane.path, p.kind, rows * columns, offset=place).reshape(rows, columns))
-        target[:] = stored if one else stored * np.float64(plane.slope) + plane.intercept
+    with foreign.unpacked([plane for plane in planes if plane.pixels.offset < 0]) as at:
+        for target, plane in zip(out, planes, strict=True):
+            p = plane.pixels
+            place = max(p.offset, 0) + plane.frame * p.frame_bytes
+            found = np.fromfile(at.get(plane.path, plane.path), p.kind, rows * columns, offset=place)
+            stored = grey(plane, found.reshape(rows, columns))
+            target[:] = stored if one else stored * np.float64(plane.slope) + plane.intercept
     return scaled(out, planes[0].slope, planes[0].intercept).T if one else out.T
-
-
-def _unpacked(planes: tuple[Plane, ...]) -> NDArray[Any]:
-    """Packed planes as ITK unpacks (and rescales) them."""
-    files = list(dict.fromkeys(plane.path for plane in planes))
-    several = planes[0].several
-    if several and len({(plane.slope, plane.intercept) for plane in planes}) > 1:
-        raise unusable(files[0], "packed frames with slopes of their own; allowed: unpacked ones; export it again")
-    p = planes[0].pixels
-    count = len(planes) if not several else max(plane.frame for plane in planes) + 1
-    with foreign.temporary() as folder:
-        head = foreign.converted(files, count * p.frame_bytes, folder)
-        values = read_box(head, 0, ((0, 0, 0), head.shape))
-    values = values[:, :, [plane.frame for plane in planes]] if several else values
-    if values.shape != (p.columns, p.rows, len(planes)):
-        raise unusable(files[0], f"unpacked to {values.shape} voxels; expected {(p.columns, p.rows, len(planes))}")
-    if not p.inverted:
-        return values
-    top = -1 if p.kind[1] == "i" else (1 << p.bits) - 1
-    return np.asarray(np.float32(planes[0].slope * top + 2 * planes[0].intercept) - values.astype(np.float32))
 
 
 def _resampled(header: Header, stack: Stack) -> NDArray[np.float32]:

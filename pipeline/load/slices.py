@@ -201,8 +201,9 @@ def _pixels(path: Path, data: Any, frames: int) -> Pixels:
     if element is None or bits not in (8, 16, 32) or rows < 1 or columns < 1:
         found = f"{rows} x {columns} pixels of {bits} bits, {'no ' if element is None else ''}pixel data"
         raise unusable(path, f"{found}; allowed: an image of 8, 16 or 32 bits; take it out of the folder")
-    signed = int(data.get("PixelRepresentation") or 0) == 1
     syntax = str(getattr(data, "file_meta", {}).get("TransferSyntaxUID", "") or "")
+    _require_plain_greys(path, data, bytes_in_words=bits == 8 and syntax == BIG_ENDIAN and element.VR == "OW")
+    signed = int(data.get("PixelRepresentation") or 0) == 1
     kind = (">" if syntax == BIG_ENDIAN else "<") + ("i" if signed else "u") + str(bits // 8)
     stored = int(data.get("BitsStored") or bits)
     high = int(data.get("HighBit") if data.get("HighBit") is not None else stored - 1)
@@ -217,6 +218,16 @@ def _pixels(path: Path, data: Any, frames: int) -> Pixels:
         why = f"is cut short: {there} bytes of pixels, {frames * pixels.frame_bytes} are stated"
         raise unusable(path, f"cannot read it: the file {why}. Check that the file is complete: copy it again.")
     return pixels
+
+
+def _require_plain_greys(path: Path, data: Any, *, bytes_in_words: bool) -> None:
+    """LoadError where greys are more than a slope and an intercept of what is stored, or neighbours are exchanged."""
+    if data.get("ModalityLUTSequence"):
+        why = "ModalityLUTSequence holds a table of greys for stored values; allowed: RescaleSlope and RescaleIntercept"
+        raise unusable(path, f"{why}. Export the series again with the modality LUT applied.")
+    if bytes_in_words:
+        why = "PixelData of 8 bits as words (OW) in explicit big endian, where each word exchanges two pixels"
+        raise unusable(path, f"{why}; allowed: bytes (OB), or explicit little endian. Export the series again.")
 
 
 def grey(plane: Plane, stored: NDArray[Any]) -> NDArray[Any]:

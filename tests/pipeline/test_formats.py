@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pydicom
 import pytest
 
 from pipeline.load import LoadError, load, read_header
 from tests.studies.formats import Variant, outcome, variants
+from tests.studies.formats.base import numbered
+from tests.studies.formats.dicom import series
 
 VARIANTS = variants()
 OTHERS = sorted((Path(pydicom.__file__).parent / "data" / "test_files").glob("*.dcm"))
@@ -34,3 +37,14 @@ def test_files_of_others_are_read_or_refused_in_a_sentence(path: Path) -> None:
         assert path.name in str(error)  # noqa: PT017
     else:
         assert min(volume.shape) >= 2
+
+
+def test_of_packed_slices_the_one_that_cannot_be_unpacked_is_named(tmp_path: Path) -> None:
+    def finish(data: pydicom.FileDataset) -> None:
+        data.compress(pydicom.uid.RLELossless)
+        if data.InstanceNumber == 5:
+            data.PixelData = pydicom.encaps.encapsulate([b"\xff" * 64])
+
+    series("{k:02d}.dcm", values=np.pad(numbered(), ((0, 3), (0, 1), (0, 0))), finish=finish)(tmp_path)
+    with pytest.raises(LoadError, match=r"06\.dcm: cannot be unpacked: ITK"):  # 7 * 4 % 11
+        load(read_header(tmp_path))

@@ -6,6 +6,7 @@ from pathlib import Path
 from unittest.mock import Mock
 
 import numpy as np
+import pydicom
 import pytest
 
 from pipeline.load import LoadError, load, read_header
@@ -37,6 +38,21 @@ def test_a_folder_with_one_multiframe_file_is_a_series(tmp_path: Path) -> None:
     (tmp_path / "series").mkdir()
     (tmp_path / "series" / "scan.dcm").write_bytes(enhanced(numbered(), SPACING, straight_stack()))
     np.testing.assert_array_equal(load(read_header(tmp_path / "series")).values, numbered())
+
+
+def test_packed_frames_are_rescaled_by_their_own_slopes(tmp_path: Path) -> None:
+    even = np.pad(numbered(), ((0, 3), (0, 1), (0, 0)))  # GDCM refuses tinier planes
+    path = tmp_path / "scan.dcm"
+    path.write_bytes(enhanced(even, SPACING, straight_stack()))
+    scan = pydicom.dcmread(path)
+    for k, groups in enumerate(scan.PerFrameFunctionalGroupsSequence):
+        rescale = pydicom.Dataset()
+        rescale.RescaleSlope, rescale.RescaleIntercept = 1 + 99 * (k > 0), -k
+        groups.PixelValueTransformationSequence = [rescale]
+    scan.compress(pydicom.uid.RLELossless)
+    scan.save_as(path)
+    want = even * (1 + 99 * (np.arange(9) > 0)) - np.arange(9)
+    np.testing.assert_array_equal(load(read_header(path)).values, want)
 
 
 def test_a_missing_frame_is_named_or_filled_on_request(tmp_path: Path) -> None:

@@ -49,20 +49,23 @@ def series(
     values: np.ndarray = VALUES,
     syntax: str = ExplicitVRLittleEndian,
     skip: tuple[int, ...] = (),
+    finish: Callable[[FileDataset], Any] = lambda _data: None,
     **tags: Any,
 ) -> Callable[[Path], Path]:
     def write(folder: Path) -> Path:
         for k in range(values.shape[2]):
             if k not in skip:
                 tags_of = {"InstanceNumber": k + 1} | tags | of(k)
-                one(values[:, :, k], place(k), syntax, **tags_of).save_as(folder / name.format(k=(7 * k) % 11))
+                data = one(values[:, :, k], place(k), syntax, **tags_of)
+                finish(data)
+                data.save_as(folder / name.format(k=(7 * k) % 11))
         return folder
 
     return write
 
 
 def dicom_variants() -> Iterator[Variant]:
-    for make in (of_values, of_places, of_tags, of_whole_files, of_folders):
+    for make in (of_values, of_packed_values, of_stored_bits, of_places, of_tags, of_whole_files, of_folders):
         for name, write, want, more in make():
             yield Variant(name, write, want, **({"direction": np.eye(3)} | more))
 
@@ -82,6 +85,48 @@ def of_values() -> Iterator[Made]:
     turned = {"PhotometricInterpretation": "MONOCHROME1", "Modality": "XA", "PixelRepresentation": 0}
     yield "dicom, MONOCHROME1", series(BitsStored=12, HighBit=11, **turned), "MONOCHROME1", {"values": 4095 - VALUES}
     yield "dicom, colours", series(PhotometricInterpretation="RGB"), "!grey values", {}
+
+
+def of_packed_values() -> Iterator[Made]:
+    """The same values as of unpacked slices, whatever ITK makes of the elements that say how to take them."""
+    even = np.pad(VALUES, ((0, 3), (0, 1), (0, 0)))  # GDCM refuses tinier planes
+
+    def packed(**more: Any) -> Callable[[Path], Path]:
+        return series(**{"values": even, "finish": lambda data: data.compress(RLELossless)} | more)
+
+    yield "dicom, RLE", packed(), "right", {"values": even}
+    turned = {"PhotometricInterpretation": "MONOCHROME1", "PixelRepresentation": 0, "BitsStored": 12, "HighBit": 11}
+    yield "dicom, RLE, MONOCHROME1 of a CT", packed(**turned), "right", {"values": even}
+    yield "dicom, RLE, MONOCHROME1", packed(**turned, Modality="XA"), "MONOCHROME1", {"values": 4095 - even}
+    slopes = 1 + 99 * (np.arange(9) > 0)
+    own = packed(of=lambda k: {"RescaleSlope": slopes[k], "RescaleIntercept": 0})
+    yield "dicom, RLE, a slope of its own a slice", own, "right", {"values": even * slopes}
+    for high in (15, 13):
+        kept = {"values": even << (high - 11), "BitsStored": 12, "HighBit": high, "PixelRepresentation": 0}
+        yield f"dicom, RLE, 12 bits up to bit {high}", packed(**kept), "right", {"values": even}
+
+
+def of_stored_bits() -> Iterator[Made]:
+    def with_table(data: FileDataset) -> None:
+        table = Dataset()
+        table.LUTDescriptor, table.ModalityLUTType, table.LUTData = (
+            [1024, 0, 16],
+            "US",
+            np.arange(1023, -1, -1).astype("<u2").tobytes(),
+        )
+        data.ModalityLUTSequence = [table]
+
+    yield "dicom, a modality LUT", series(finish=with_table, PixelRepresentation=0), "!modality LUT applied", {}
+    small = VALUES % 200
+
+    def as_words(data: FileDataset, k: int) -> None:
+        plane = np.pad(np.ascontiguousarray(small[:, :, k].T).astype("u1").ravel(), (0, 1))
+        data.PixelData = plane.reshape(-1, 2)[:, ::-1].tobytes()
+        data["PixelData"].VR = "OW"
+
+    short = {"BitsAllocated": 8, "BitsStored": 8, "HighBit": 7, "PixelRepresentation": 0}
+    words = series(syntax=ExplicitVRBigEndian, finish=lambda data: as_words(data, data.InstanceNumber - 1), **short)
+    yield "dicom, 8 bits as words in big endian", words, "!explicit big endian", {}
 
 
 def of_places() -> Iterator[Made]:
@@ -145,17 +190,6 @@ def of_whole_files() -> Iterator[Made]:
 
 
 def of_folders() -> Iterator[Made]:
-    even = np.pad(VALUES, ((0, 3), (0, 1), (0, 0)))  # GDCM refuses planes of an odd number of bytes
-
-    def packed(folder: Path) -> Path:
-        for k in range(9):
-            data = one(even[:, :, k], ORIGIN + [0, 0, 0.7 * k], ExplicitVRLittleEndian)
-            data.compress(RLELossless)
-            data.save_as(folder / f"{k}.dcm")
-        return folder
-
-    yield "dicom, RLE", packed, "right", {"values": even}
-
     def beside(folder: Path) -> Path:
         series()(folder)
         (folder / "notes.txt").write_text("read me", encoding="utf-8")
