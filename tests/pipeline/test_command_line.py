@@ -367,6 +367,9 @@ def test_a_gate_closes_on_the_limit_s_far_side_and_on_nothing_to_go_by() -> None
     withheld = {"rms_low_mm": float("nan"), "interval": "interval withheld: 1 insertion, at least 3 needed"}
     assert "no rms_low_mm: interval withheld: 1 insertion" in gate("rms_low_mm>0.5").closed(withheld)
     assert "no case was scored" in gate("rms_mm>0.5").closed({})
+    many, one = gate("warnings>0").closed({"warnings": 5}), gate("warnings>0").closed({"warnings": 1})
+    assert many.endswith("warnings is 5 (in each case and of the run; what cases say alike is one line on a page)")
+    assert one.endswith("warnings is 1"), "a page shows one, too"
     for nothing in ({}, {"rms_mm": None}, {"rms_mm": float("nan")}):
         assert "cannot be shown" in gate("rms_mm>0.5").closed(nothing)
 
