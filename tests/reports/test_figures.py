@@ -28,7 +28,7 @@ from reports.figures.simulators import SimulatorFiles, _nearest, unbroken, who_i
 from reports.figures.simulators import colours as colours_of
 from reports.frames_file import FrameArrays, ScanCrop, Straightened, frame_numbers, read_frame, read_scan, write_frames
 from reports.page import draw_sections
-from reports.schema import BUDGET, ENTRIES, ERRORS, OURS, POINTS, SUMMARY, SWEEP, TIMINGS
+from reports.schema import ALL, BUDGET, ENTRIES, ERRORS, OURS, POINTS, SUMMARY, SWEEP, TIMINGS
 from reports.verdict import NEVER_NEAREST
 from tests.reports.fake_results import FakeCase, write_run
 
@@ -739,6 +739,8 @@ def test_a_caption_says_only_what_is_drawn_of_the_cases(cases: int, said: bool, 
     (entry,) = [entry for entry in declared("run") if entry["figure"] == "planned_within"]
     assert ("thin: each case" in caption(entry["read"], drawing.table)) == said
     assert len(drawing.figure.axes[0].get_lines()) == 1 + said * cases
+    names = [ALL, "c0", "c1"] if said else ["c0"]
+    assert [*drawing.table["case"].unique()] == names, "rows were of nobody"
 
 
 @pytest.mark.quick(1)
