@@ -440,6 +440,9 @@ def test_marks_at_the_end_of_four_entries_are_whole(tmp_path: Path) -> None:
     tables.write(tmp_path / "entries.csv", ENTRIES, [{"clamp": "manifest", "depth": "traced"} | far])
     drawing = draw(CASE_FIGURES["budget"], _empty_case(tmp_path))
     assert drawing.figure.axes[0].get_xlim() == pytest.approx((0.0, 0.165))
+    dot, square, _ = drawing.figure.axes[0].get_lines()
+    assert square.get_fillstyle() == "none", "a dot at the same place was hidden"
+    assert square.get_markersize() - square.get_markeredgewidth() > dot.get_markersize() + 1.0
 
 
 def test_only_what_was_computed_of_a_budget_is_drawn(tmp_path: Path) -> None:
