@@ -519,12 +519,25 @@ def test_projections_choose_first_middle_last_and_worst(tmp_path: Path) -> None:
     drawing, failed = (draw(CASE_FIGURES[name], case) for name in ("projections", "failed_projections"))
     titles = [axes.get_title(loc="left") for axes in drawing.figure.axes]
     assert [t for t in titles if "frame" in t] == [
-        "frame 1 (first)",
+        "frame 1 (first ok)",
         "frame 3 (worst)",
         "frame 5 (middle)",
         "frame 8 (last)",
     ]
     assert any(axes.get_title(loc="left") == "frame 0 (no_wire)" for axes in failed.figure.axes)
+
+
+def test_frames_that_failed_at_both_ends_have_rows(tmp_path: Path) -> None:
+    """The map of errors ended at the last frame that is ok, as if there were no other."""
+    out = write_run(tmp_path / "out", (FakeCase("c", frames=6, failed=(0, 5)),))
+    case = read_case(out / "cases" / "c")
+    for name in ("error_along_wire", "contact_along_wire"):
+        (rows,) = draw(CASE_FIGURES[name], case).frames
+        assert list(rows.of_frame) == [*range(6)], name
+        low, high = sorted(rows.axes.get_ylim())
+        assert (low, high) == (-0.5, 5.5), name
+    titles = [axes.get_title(loc="left") for axes in draw(CASE_FIGURES["projections"], case).figure.axes]
+    assert [title for title in titles if "frame" in title][-1].startswith("frame 4 (last ok")
 
 
 def test_failed_frames_are_marked_and_their_values_not_drawn(tmp_path: Path) -> None:
