@@ -63,6 +63,12 @@ TOO_LONG = (
         ("run x -o y --resme", "did you mean '--resume'?"),
         ("cache --info x", "one argument too many"),
         (
+            "run STUDY STUDY/manifest.toml -o y",
+            "manifest.toml: run takes one manifest; several are joined into one, as",
+        ),
+        ("run STUDY STUDY -o y", "or given one after the other, each with an OUT of its own"),
+        ("check STUDY STUDY/manifest.toml", "or given one after the other"),
+        (
             "run m.toml -o out --only a b c",
             "b: not an option of wireval run; --only takes one value; repeat it: --only b",
         ),
