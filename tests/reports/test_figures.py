@@ -213,15 +213,15 @@ def test_a_table_of_forces_tells_refused_frames_from_others(tmp_path: Path) -> N
 
 
 def test_a_refused_frame_without_a_wire_has_a_cross_in_its_row(tmp_path: Path) -> None:
-    """Its row was blank, as of a frame that nobody refused; a frame beside the rows of the map has no place for one."""
+    """Its row was blank, as of a frame that nobody refused; the last one had no row at all."""
     case = _heat_case(tmp_path)
     assert case.samples is not None
     errors = pd.DataFrame({"frame": [0, 1, 2, 3], "status": ["ok", "no_wire", "ok", "no_wire"]})
     forces = case.samples.assign(contact_force_N=1.0)
     drawing = draw(CASE_FIGURES["contact_along_wire"], replace(case, samples=forces, errors=errors))
     (crosses,) = drawing.figure.axes[0].lines
-    assert list(crosses.get_ydata()) == [1]
-    assert drawing.table[drawing.table["status"] == "no_wire"]["frame"].tolist() == [1]
+    assert list(crosses.get_ydata()) == [1, 3]
+    assert drawing.table[drawing.table["status"] == "no_wire"]["frame"].tolist() == [1, 3]
 
 
 def test_long_names_leave_room_for_what_is_drawn(tmp_path: Path) -> None:
