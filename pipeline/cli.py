@@ -127,7 +127,7 @@ def _unknown(
     """What is said of a word that a verb does not know. words : all that was typed."""
     long = [name for name in allowed if name.startswith("--")]
     hint = did_you_mean(word, long) if word.startswith("-") else "one argument too many"
-    if verb in OF_MANIFEST and not word.startswith("-") and status_of(Path(word)):
+    if verb in OF_MANIFEST and not word.startswith("-") and (word.endswith(".toml") or status_of(Path(word))):
         own = ", each with an OUT of its own" * ("--out" in allowed)
         return _usage(f"{word}: {verb} takes one manifest; {SEVERAL}{own}")
     before = [one for one in words[: words.index(word)] if one.startswith("-")] if word in words else []

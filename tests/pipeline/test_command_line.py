@@ -67,6 +67,7 @@ TOO_LONG = (
             "manifest.toml: run takes one manifest; several are joined into one, as",
         ),
         ("run STUDY STUDY -o y", "or given one after the other, each with an OUT of its own"),
+        ("run a.toml b.toml -o y", "b.toml: run takes one manifest"),
         ("check STUDY STUDY/manifest.toml", "or given one after the other"),
         (
             "run m.toml -o out --only a b c",
