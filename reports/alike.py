@@ -15,9 +15,9 @@ _NUMBER = re.compile(r"\d+(\.\d+)?")
 def alike(rows: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
     """Rows of failures.csv, those of a case that differ in frame, scan and numbers alone merged into the first.
 
-    Each has ``count``, how many rows it stands for, ``frames``, their numbers in words, and ``of``, the same behind
-    ``frame`` or ``frames`` (empty for a whole case), and ``files``, the files that could not be read where there are
-    several.
+    Each has ``count``, how many rows it stands for, ``failed``, what they are of (case, and frame or ""), ``frames``,
+    the frames' numbers in words, and ``of``, the same behind ``frame`` or ``frames`` (empty for a whole case), and
+    ``files``, the files that could not be read where there are several.
     """
     groups: dict[tuple[str, ...], list[Mapping[str, Any]]] = {}
     for row in rows:
@@ -35,9 +35,10 @@ def line_of(row: Mapping[str, Any]) -> str:
     return f"{row['case']}{of}: {row['status']}: {files}{said or row['sentence']}"
 
 
-def _of_frames(rows: Sequence[Mapping[str, Any]]) -> dict[str, str]:
+def _of_frames(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     numbers = [row["frame"] for row in rows if _stated(row)]
-    return {"frames": in_words(numbers), "of": frames_in_words(numbers) if numbers else ""}
+    failed = {(str(row["case"]), str(int(row["frame"])) if _stated(row) else "") for row in rows}
+    return {"failed": failed, "frames": in_words(numbers), "of": frames_in_words(numbers) if numbers else ""}
 
 
 def _files(rows: Sequence[Mapping[str, Any]]) -> str:
@@ -69,10 +70,12 @@ def frames_in_words(numbers: Sequence[int]) -> str:
 
 
 def of_what(rows: Iterable[Mapping[str, Any]]) -> str:
-    """``2 frames, 1 case`` of the rows that ``alike`` gave; a case without any result is not counted as a frame."""
-    counts = {"frame": 0, "case": 0}
-    for row in rows:
-        counts["frame" if row["frames"] else "case"] += row["count"]
+    """``2 frames, 1 case`` of the rows that ``alike`` gave; a case without any result is not counted as a frame.
+
+    A frame of which several simulators have no result, as one without a trace, is one frame.
+    """
+    failed = set[tuple[str, str]]().union(*(row["failed"] for row in rows))
+    counts = {"frame": sum(bool(frame) for _, frame in failed), "case": sum(not frame for _, frame in failed)}
     return ", ".join(counted(count, what) for what, count in counts.items() if count)
 
 

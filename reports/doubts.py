@@ -94,7 +94,8 @@ def twins(doubts: Iterable[str]) -> str:
 def said_by_cases(results: Mapping[str, Mapping[str, Any]], key: str) -> list[str]:
     """What the cases of a run say under ``warnings`` or ``assumptions``, a line each, with the cases that say it.
 
-    What differs in its numbers alone is one line, that of the first case. results : result.json by case.
+    What differs in its numbers alone is one line, that of the first case, which is named where others say it, too.
+    results : result.json by case.
     """
     if len(results) == 1:
         return [str(text) for result in results.values() for text in result.get(key, ())]
@@ -105,9 +106,10 @@ def said_by_cases(results: Mapping[str, Mapping[str, Any]], key: str) -> list[st
     lines = []
     for texts in said.values():
         cases = dict.fromkeys(case for named in texts.values() for case in named)
-        others = len(texts) - 1
-        more = f" ({others} more with other numbers, on the pages of the cases)" * (others > 0)
-        lines.append(f"{listed([*cases])}: {next(iter(texts))}{more}")
+        (text, own), others = next(iter(texts.items())), len(texts) - 1
+        whose = f"numbers of {listed(list(dict.fromkeys(own)))}; " * (cases.keys() != {*own})
+        more = f" ({whose}{others} more with other numbers, on the pages of the cases)" * (others > 0)
+        lines.append(f"{listed([*cases])}: {text}{more}")
     return lines
 
 

@@ -17,8 +17,8 @@ FILES = {
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """What may follow the verb."""
     add = parser.add_argument
-    add("first", type=Path, metavar="OUT_A", help="the baseline")
-    add("second", type=Path, metavar="OUT_B", help="the candidate")
+    add("first", type=Path, metavar="OUT_A", help="the baseline (reference), which comes first")
+    add("second", type=Path, metavar="OUT_B", help="the candidate, which is judged against it")
     add(
         "--tolerance",
         type=Path,

@@ -2,14 +2,13 @@
 
 import argparse
 import atexit
-import re
 import shutil
 import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pipeline.commands import resolved_settings, say
-from reports.texts import TEXT_BYTES, status_of
+from reports.texts import status_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -60,6 +59,7 @@ def given(args: argparse.Namespace, keep: Path | None = None) -> "Manifest":
     """
     from pipeline.load import SUFFIXES
     from pipeline.status import InputError
+    from pipeline.study.infer import states_cases
     from pipeline.study.manifest import read_manifest
     from reports.atomic import write_text
 
@@ -74,7 +74,7 @@ def given(args: argparse.Namespace, keep: Path | None = None) -> "Manifest":
         if unused := _said_of_scans(args):
             raise InputError([f"{', '.join(unused)}: of a folder of scans; {path} is a manifest, which says it itself"])
         return read_manifest(path)
-    if named := [file for file in sorted(path.glob("*.toml")) if _is_manifest(file)]:
+    if named := [file for file in sorted(path.glob("*.toml")) if states_cases(file)]:
         raise InputError([f"{path}: no {NAME} in it, and {named[0].name} is a manifest; give that file: {named[0]}"])
     text, seen, _ = inferred(args)
     seen = (*_other_manifests(path), *seen)
@@ -86,11 +86,6 @@ def given(args: argparse.Namespace, keep: Path | None = None) -> "Manifest":
     written = keep / INFERRED
     write_text(written, text)
     return read_manifest(written)
-
-
-def _is_manifest(file: Path) -> bool:
-    """Whether a TOML file states cases: one that was inferred from the scans beside it would be judged instead."""
-    return file.is_file() and re.search(rb"^\s*\[\[\s*case\s*\]\]", file.read_bytes()[:TEXT_BYTES], re.M) is not None
 
 
 def _other_manifests(folder: Path) -> list[str]:

@@ -24,6 +24,8 @@ from reports.two_scores import together
 
 OF_ALL = "frames", "frames_ok", "within_1mm"
 """What a run's failures change: over all frames of these cases."""
+NO_RULER = ("compare.simulated_nulls",)
+"""Settings of ``compare`` that choose predictors and change no error: skill alone is against others then."""
 
 
 def compared(first: Path, second: Path, tolerance: Path | None = None) -> Verdict:
@@ -66,7 +68,7 @@ def _of_one(first: Path, second: Path, tolerance: Mapping[str, float]) -> Verdic
     elif paired.low > allowed:
         judged = "worse"
     differs = what_differs(first, second)
-    ruler = ", ".join(row["what"] for row in differs if row["what"].startswith("compare."))
+    ruler = ", ".join(what for row in differs if (what := row["what"]).startswith("compare.") and what not in NO_RULER)
     otherwise = f"errors are measured otherwise in the second run ({ruler})" * bool(ruler)
     unpaired = "over all frames nothing is judged: no frame has points in both runs" * (paired is None)
     said = paired.verdict(allowed, otherwise) if paired else ""

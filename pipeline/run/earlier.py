@@ -1,5 +1,6 @@
 """What earlier runs have left in an output folder and a new one removes: records, and cases of other manifests."""
 
+import sys
 from contextlib import suppress
 from glob import escape
 from pathlib import Path
@@ -14,12 +15,20 @@ from reports.records import read_json, run_records
 def remove_arrays(out: Path, name: str) -> None:
     """Remove what shards of arrays of another size say of themselves: their cases are computed anew, or kept, by this.
 
-    name : of this run's record.
+    A line on stderr says so: who mistyped one number of an array would look for the cases of the other. name : of this
+    run's record.
     """
     size = name.rpartition("-")[2]
-    for path in run_records(out) if "-" in name else ():
-        if "-" in path.name and not path.name.endswith(f"-{size}"):
-            remove_files(path)
+    others = [path for path in run_records(out) if "-" in path.name and not path.name.endswith(f"-{size}")]
+    if "-" not in name or not others:
+        return
+    remove_files(*others)
+    sizes = " and of ".join(map(str, sorted({int(path.stem.rpartition("-")[2]) for path in others})))
+    count = int(Path(name).stem.rpartition("-")[2])
+    sys.stderr.write(
+        f"{out}: shards of an array of {sizes} wrote here, and this is one of {count}: their records were removed; run "
+        f"all {count}, which keep the cases that are finished\n"
+    )
 
 
 def remove_records(out: Path, manifest: str) -> None:

@@ -13,6 +13,8 @@ from reports.texts import NUMBER
 
 CLOSED = "gate closed"
 A_FEW = "numbers are rms_mm, tip_median_mm, skill_strongest, frames_failed and those in docs/reference/columns.md"
+COUNTED = {"warnings": "in each case and of the run; what cases say alike is one line on a page"}
+"""What is counted by columns that a reader counts otherwise: five warnings of five cases stand as one line."""
 RELATIONS = {"<=": operator.le, ">=": operator.ge, "<": operator.lt, ">": operator.gt}
 WRITTEN = re.compile(rf"\s*(?:([\w.-]+):)?\s*(\w+)\s*({'|'.join(RELATIONS)})\s*({NUMBER})\s*")
 
@@ -57,11 +59,15 @@ class Gate:
             why = f": {interval}" * (end and ("withheld" in interval or self.column in interval))
             return f"{CLOSED}: {self.asked}: {OVERALL_FILE} has no {self.column}{why}; it cannot be shown to hold"
         passed = not RELATIONS[self.relation](value, self.limit)
-        return "" if passed else f"{CLOSED}: {self.asked}: {self.column} is {value:.4g}"
+        return "" if passed else f"{CLOSED}: {self.asked}: {self._is(value)}"
 
     def open(self, overall: Mapping[str, Any]) -> str:
         """What is said of a run with this row that may pass."""
-        return f"gate open: {self.asked}: {self.column} is {float(overall[self.column]):.4g}"
+        return f"gate open: {self.asked}: {self._is(float(overall[self.column]))}"
+
+    def _is(self, value: float) -> str:
+        counted = COUNTED.get(self.column, "") if value > 1 else ""
+        return f"{self.column} is {value:.4g}" + f" ({counted})" * bool(counted)
 
 
 def gate(text: str, simulators: Sequence[str] = ()) -> Gate:

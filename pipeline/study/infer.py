@@ -17,6 +17,7 @@ from pipeline.model import Array, Volume, Wall
 from pipeline.study.first_wire import NOWHERE, infer_entry, wire_voxels
 from pipeline.study.same_grid import apart
 from reports.case_files import listed
+from reports.texts import TEXT_BYTES
 
 NO_REFERENCE = "reference: none found (a file named reference.*); --reference names a scan without the wire"
 REFERENCE_NAMES = ("reference", "ref", "wire_free", "nowire", "empty")
@@ -83,6 +84,23 @@ def _cases(folder: Path) -> str:
         f"init` on each, as on {name}/{first}, then put their [[case]] blocks and one [wires.assumed] into one "
         f"{name}/manifest.toml, with {first}/ and so on before their paths"
     )
+
+
+def _studies(folder: Path) -> str:
+    """A hint where folders in it have manifests, not inferred ones, which a run leaves in its output; empty without."""
+    found = [p for p in sorted(folder.glob("*/*.toml")) if not p.name.endswith(".inferred.toml") and states_cases(p)]
+    if not found:
+        return ""
+    names = listed([p.relative_to(folder).as_posix() for p in found], 3)
+    return (
+        f"; below it {'is a manifest' if len(found) == 1 else 'are manifests'}: {names}; give one, as {found[0]}"
+        + "; to judge several together join them into one manifest" * (len(found) > 1)
+    )
+
+
+def states_cases(file: Path) -> bool:
+    """Whether a TOML file states cases: one that was inferred from the scans beside it would be judged instead."""
+    return file.is_file() and re.search(rb"^\s*\[\[\s*case\s*\]\]", file.read_bytes()[:TEXT_BYTES], re.M) is not None
 
 
 def _deeper(folder: Path) -> str:
@@ -206,7 +224,7 @@ def infer_manifest(
     if not frames:
         allowed = f"files {', '.join(SUFFIXES)} or DICOM folders, here or in frames/"
         found = f"{reference.name} alone, a reference, and no frames" if reference else "no scans"
-        hint = _loose(folder) or _items(folder) or _cases(folder) or _deeper(folder) or _packed(folder)
+        hint = next(filter(None, (look(folder) for look in (_studies, _loose, _items, _cases, _deeper, _packed))), "")
         raise unusable(folder, f"found {found}; allowed: {allowed}{hint}")
     seen = (
         f"frames: {len(frames)} scans in natural order, {_order([path.name for path in frames])}",

@@ -40,6 +40,10 @@ PARAMETERS = "calibrate.parameters"
 """What config.resolved.toml calls the file that was given as --parameters."""
 
 
+TYPED = "command line"
+"""Where settings come from that stand beside --set."""
+
+
 class SettingsError(InputError):
     """Settings that cannot be used."""
 
@@ -79,7 +83,7 @@ class Setting:
     source: str
 
 
-def parse_assignment(text: str, source: str = "command line") -> Setting:
+def parse_assignment(text: str, source: str = TYPED) -> Setting:
     """``table.key=value`` as typed after --set; the value is TOML, a bare word is a string."""
     name, equals, raw = text.partition("=")
     if not equals or "." not in name:

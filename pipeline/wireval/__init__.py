@@ -17,6 +17,7 @@ found raises ``StageError``; both say what the command would print.
 """
 
 import json
+import re
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -30,6 +31,7 @@ from pipeline.compare import point_to_curve
 from pipeline.run.compared import compared
 from pipeline.run.provenance import package_version
 from pipeline.status import InputError, StageError
+from pipeline.study.settings import TYPED, SettingsError
 from reports.case_files import CaseFiles
 from reports.frames_file import FrameArrays, ScanCrop
 from reports.texts import UnreadableError
@@ -203,6 +205,8 @@ def _carried_out(verb: str, manifest: str, settings: object = None, **options: o
             code = carried_out(args)
         except UnreadableError as error:
             raise InputError([str(error)]) from None
+        except SettingsError as error:  # they were handed on as if they had been typed
+            raise SettingsError([re.sub(f"^{TYPED}: ", "settings: ", text) for text in error.problems]) from None
     if code == BAD_INPUT:
         raise InputError([f"wireval {verb}: nothing was run; the problems stand above"])
 

@@ -21,13 +21,14 @@ def error_along_wire(case: CaseFiles) -> Drawing | None:
     """Distance to the traced curve along the simulated wire, of frames that are ok."""
     failed = set(case.errors["frame"]) - set(case.good["frame"])
     points = case.points[~case.points["frame"].isin(failed)]
-    return _along_wire(points, "error_mm", "distance to the traced curve, mm", error_scale())
+    return _along_wire(case, points, "error_mm", "distance to the traced curve, mm", error_scale())
 
 
 def error_over_u(case: CaseFiles) -> Drawing | None:
     """The error across the traced wire over its uncertainty, of frames that are ok."""
     points = case.points[case.points["frame"].isin(case.good["frame"])]
-    return _along_wire(points, "error_over_u", "error over u (beyond 2: the model's)", Normalize(0.0, _MOST_OVER_U))
+    scale = Normalize(0.0, _MOST_OVER_U)
+    return _along_wire(case, points, "error_over_u", "error over u (beyond 2: the model's)", scale)
 
 
 def contact_along_wire(case: CaseFiles) -> Drawing | None:
@@ -36,7 +37,7 @@ def contact_along_wire(case: CaseFiles) -> Drawing | None:
     known = points["contact_force_N"].dropna()
     most = float(np.percentile(known, _CLIP_PERCENTILE)) if len(known) else 0.0
     scale = Normalize(0.0, max(most, 1e-9))
-    drawing = _along_wire(points, "contact_force_N", "contact force, N", scale, zero=_NO_FORCE)
+    drawing = _along_wire(case, points, "contact_force_N", "contact force, N", scale, zero=_NO_FORCE)
     if drawing is None:
         return None
     # the wires of refused frames are shown, too: with the cross that the map of a run has for such a frame
@@ -61,12 +62,18 @@ def _joints(case: CaseFiles) -> pd.DataFrame:
     return pd.concat(parts, ignore_index=True) if len(parts) > 1 else case.points
 
 
-def _along_wire(points: pd.DataFrame, column: str, label: str, scale: Normalize, zero: str = "") -> Drawing | None:
-    """The map of a column. zero : colour of what is exactly 0, where that is another thing than little."""
+def _along_wire(
+    case: CaseFiles, points: pd.DataFrame, column: str, label: str, scale: Normalize, zero: str = ""
+) -> Drawing | None:
+    """The map of a column. zero : colour of what is exactly 0, where that is another thing than little.
+
+    Each frame of the case has its row: without those at the ends that failed a page seemed to have all.
+    """
     kept = points[points[column].notna() & points["arc_mm"].notna()]
     if kept.empty:
         return None
-    frames = np.arange(int(kept["frame"].min()), int(kept["frame"].max()) + 1)
+    every = pd.concat([kept["frame"], case.errors["frame"]]).astype(int)
+    frames = np.arange(every.min(), every.max() + 1)
     step = _step(kept)
     grid, held = np.full((len(frames), int(kept["arc_mm"].max() / step) + 2), np.nan), np.zeros(len(frames))
     for frame, samples in kept.groupby("frame"):

@@ -64,7 +64,8 @@ def _by_source(axes: Axes, table: pd.DataFrame) -> None:
 def _by_entry(axes: Axes, table: pd.DataFrame) -> None:
     places = np.arange(len(table))
     axes.plot(table["rms_mm"], places, "o", color=SIMULATED, label="rms")
-    axes.plot(table["distal10_rms_mm"], places, "s", color=PURPLE, label="last 10 mm")
+    around: Look = {"fillstyle": "none", "markersize": 10, "markeredgewidth": 1.6}  # it hid a dot at the same place
+    axes.plot(table["distal10_rms_mm"], places, "s", color=PURPLE, label="last 10 mm", **around)
     axes.plot(table["tip_median_mm"], places, "x", color=BAD, label="tip, median")
     rows = zip(table["clamp"], table["depth"], strict=True)
     axes.set_yticks(places, [f"clamp {clamp},\ndepth {depth}" for clamp, depth in rows], fontsize=8)

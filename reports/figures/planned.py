@@ -7,6 +7,7 @@ from reports.colours import SIMULATED
 from reports.figures._drawing import Drawing, new_figure, plain
 from reports.figures._style import GREY
 from reports.figures.run import RunFiles
+from reports.schema import ALL
 
 _CLEAR_CURVES = 15
 _MOST_MM = 100.0  # beyond it a frame may as well have failed
@@ -34,8 +35,8 @@ def planned_within(run: RunFiles) -> Drawing | None:
     axes.set_xlabel("95th percentile of the distance, simulated to traced wire, mm")
     axes.set_ylabel("share of all planned frames")
     plain(axes)
-    parts = [pd.DataFrame({"p95_mm": across, "share_of_planned": share})]
-    parts += [pd.DataFrame({"case": case, "p95_mm": x, "share_of_planned": y}) for case, (x, y) in curves.items()]
+    curves = {ALL if curves else next(iter(planned)): (across, share)} | curves  # a single case is all there is
+    parts = [pd.DataFrame({"case": case, "p95_mm": x, "share_of_planned": y}) for case, (x, y) in curves.items()]
     return Drawing(figure, pd.concat(parts))
 
 

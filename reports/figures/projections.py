@@ -39,7 +39,10 @@ def projections(case: CaseFiles) -> Drawing | None:
     numbers = good["frame"].astype(int).tolist()
     worst = int(good[WORST].to_numpy().argmax())
     titles: dict[int, list[str]] = {}
-    for title, place in (("first", 0), ("middle", len(numbers) // 2), ("last", -1), ("worst", worst)):
+    every = case.errors["frame"]  # of a case whose last frame failed, the last one here is the last that is ok
+    first = "first" if numbers[0] == every.min() else "first ok"
+    last = "last" if numbers[-1] == every.max() else "last ok"
+    for title, place in ((first, 0), ("middle", len(numbers) // 2), (last, -1), ("worst", worst)):
         titles.setdefault(numbers[place], []).append(title)
     chosen = [(n, " and ".join(titles[n])) for n in sorted(titles) if n in case.frames]
     frames = [case.read_frame(n) for n, _ in chosen]

@@ -63,6 +63,13 @@ TOO_LONG = (
         ("run x -o y --resme", "did you mean '--resume'?"),
         ("cache --info x", "one argument too many"),
         (
+            "run STUDY STUDY/manifest.toml -o y",
+            "manifest.toml: run takes one manifest; several are joined into one, as",
+        ),
+        ("run STUDY STUDY -o y", "or given one after the other, each with an OUT of its own"),
+        ("run a.toml b.toml -o y", "b.toml: run takes one manifest"),
+        ("check STUDY STUDY/manifest.toml", "or given one after the other"),
+        (
             "run m.toml -o out --only a b c",
             "b: not an option of wireval run; --only takes one value; repeat it: --only b",
         ),
@@ -367,6 +374,9 @@ def test_a_gate_closes_on_the_limit_s_far_side_and_on_nothing_to_go_by() -> None
     withheld = {"rms_low_mm": float("nan"), "interval": "interval withheld: 1 insertion, at least 3 needed"}
     assert "no rms_low_mm: interval withheld: 1 insertion" in gate("rms_low_mm>0.5").closed(withheld)
     assert "no case was scored" in gate("rms_mm>0.5").closed({})
+    many, one = gate("warnings>0").closed({"warnings": 5}), gate("warnings>0").closed({"warnings": 1})
+    assert many.endswith("warnings is 5 (in each case and of the run; what cases say alike is one line on a page)")
+    assert one.endswith("warnings is 1"), "a page shows one, too"
     for nothing in ({}, {"rms_mm": None}, {"rms_mm": float("nan")}):
         assert "cannot be shown" in gate("rms_mm>0.5").closed(nothing)
 

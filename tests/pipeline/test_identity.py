@@ -290,6 +290,25 @@ def test_folders_that_look_like_cases_are_no_frames_of_one(tmp_path: Path) -> No
     assert "move" not in said
 
 
+def test_manifests_below_a_folder_are_named(tmp_path: Path) -> None:
+    """A folder of two finished studies was to be run through `wireval init`."""
+    for name in ("monday", "tuesday", "out"):
+        (tmp_path / name / "frames").mkdir(parents=True)
+        (tmp_path / name / "frames" / "d22.mha").touch()
+    for name in ("monday/manifest.toml", "tuesday/study.toml", "out/manifest.inferred.toml"):
+        (tmp_path / name).write_text("schema = 1\n[[case]]\n", encoding="utf-8")
+    (tmp_path / "out" / "settings.toml").write_text("[solver]\n", encoding="utf-8")
+    with pytest.raises(LoadError) as error:
+        infer_manifest(tmp_path, None, None, None, LoadConfig())
+    said = str(error.value)
+    first = tmp_path / "monday" / "manifest.toml"
+    assert f"below it are manifests: monday/manifest.toml, tuesday/study.toml; give one, as {first}; to judge" in said
+    assert "init" not in said
+    (tmp_path / "tuesday" / "study.toml").unlink()
+    with pytest.raises(LoadError, match=f"below it is a manifest: monday/manifest.toml; give one, as {first}$"):
+        infer_manifest(tmp_path, None, None, None, LoadConfig())
+
+
 def test_what_is_packed_is_to_be_unpacked(tmp_path: Path) -> None:
     """A folder as a data set was handed out was "found no scans"."""
 

@@ -19,7 +19,7 @@ from pipeline.run.launch import Plan
 from pipeline.run.overall import found_cases, overall, ratio, shared_scans
 from reports import tables
 from reports.run_page import render_index
-from reports.schema import ERRORS, POINTS
+from reports.schema import ALL, ERRORS, POINTS
 
 pytestmark = pytest.mark.usefixtures("invented")
 GOOD, BAD = 0.3, 5.0
@@ -79,7 +79,7 @@ def test_one_population_everywhere(study: Path) -> None:
     page = render_index(study).read_text(encoding="utf-8")
     assert f"<b>{rms:.3f}</b>" in page
     curve = pd.read_csv(study / "figures" / "planned_within.csv")
-    curve = curve[curve["case"].isna()]  # the others are those of single cases
+    curve = curve[curve["case"] == ALL]  # the others are those of single cases
     assert curve["share_of_planned"].max() == pytest.approx(7 / 9), "frames that failed are planned ones, too"
     assert curve.loc[curve["p95_mm"] < BAD, "p95_mm"].max() == pytest.approx(GOOD * 1.2)
     assert whole["within_1mm"] == pytest.approx(7 / 9)
@@ -137,7 +137,7 @@ def test_a_case_without_a_result_is_a_failure_and_its_frames_were_planned(
     page = (study / "index.html").read_text(encoding="utf-8")
     assert "shares are of all planned frames, theirs among them" in page
     curve = pd.read_csv(study / "figures" / "planned_within.csv")
-    assert curve.loc[curve["case"].isna(), "share_of_planned"].max() == pytest.approx(7 / 13)
+    assert curve.loc[curve["case"] == ALL, "share_of_planned"].max() == pytest.approx(7 / 13)
     aggregate(study, info, "run.1-2.json")  # a shard that has just run: others may be at work on the rest
     assert pd.read_csv(study / "overall.csv")["frames"][0] == before["frames"]
 

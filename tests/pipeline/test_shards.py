@@ -67,6 +67,18 @@ def test_a_shard_is_known_by_its_numbers(study: Path, tmp_path: Path) -> None:
     assert [path.name for path in run_records(tmp_path)] == ["run.1-2.json"]
 
 
+def test_an_array_of_another_size_says_that_it_replaces_the_first(
+    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A shard of quarters removed the records of thirds without a word."""
+    for text in ("1/3", "2/3", "1/2"):
+        assert main(["run", str(study), "-o", str(tmp_path), "--shard", text, *QUICK]) == 0
+        said = capsys.readouterr().err
+        told = f"{tmp_path}: shards of an array of 3 wrote here, and this is one of 2: their records were removed; run"
+        assert (f"{told} all 2, which keep" in said) == (text == "1/2")
+    assert [path.name for path in run_records(tmp_path)] == ["run.1-2.json"]
+
+
 def test_from_python_an_empty_shard_has_empty_tables(study: Path, tmp_path: Path) -> None:
     results = wireval.run(study, tmp_path / "out", shard="3/3", quiet=True)
     assert (len(results.errors), len(results.points), len(results.summary), results.cases) == (0, 0, 0, {})

@@ -86,6 +86,16 @@ def test_a_check_gives_sentences(study: Path, tmp_path: Path) -> None:
     assert wireval.check(tmp_path)[0].endswith("here or in frames/"), "a folder without scans"
 
 
+def test_a_setting_that_cannot_be_is_of_the_argument_settings(study: Path, tmp_path: Path) -> None:
+    """In a notebook it was called one of the command line."""
+    said = r"^settings: no setting 'solver\.segment'; did you mean 'segment_mm'\?$"
+    with pytest.raises(wireval.InputError, match=said):
+        wireval.run(study, tmp_path / "out", settings={"solver.segment": 1})
+    assert wireval.check(study, settings={"solver.segment_mm": -1})[0].startswith("settings: solver.segment_mm")
+    with pytest.raises(wireval.InputError, match=r"^sweep: no setting 'solver\.segment'"):
+        wireval.run(study, tmp_path / "out", sweep={"solver.segment": [1]})
+
+
 def test_what_is_not_plausible_is_told_once(
     study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], recwarn: pytest.WarningsRecorder
 ) -> None:

@@ -191,8 +191,7 @@ def _write_case(folder: Path, case: FakeCase, rows: list[dict[str, Any]], statis
     if not case.simulated_only:
         tables.write(folder / "points.csv.gz", POINTS, _points(frames))
     (folder / "log.txt").write_text("load: 30 frames\n", encoding="utf-8")
-    last = frames[-1].simulated_mm
-    assert last is not None
+    last = next(wire for frame in reversed(frames) if (wire := frame.simulated_mm) is not None)
     _write_view(folder / "view", last)
     result = {
         "schema": 1,

@@ -32,6 +32,13 @@ def test_a_case_without_any_result_is_no_third_frame() -> None:
     assert of_what(alike(rows[2:])) == "1 case"
 
 
+def test_a_frame_that_failed_for_two_simulators_is_one_frame() -> None:
+    """index.html of a score counted it once a simulator: "4 frames" of a case that has three."""
+    rows = [row(n, f"no wire {n}") | {"simulator": name} for name in ("wireval", "mine") for n in (1, 2)]
+    rows += [row(None, "no lumen", case="b") | {"simulator": name} for name in ("wireval", "mine")]
+    assert of_what(alike(rows)) == "2 frames, 1 case"
+
+
 def test_other_statuses_are_not_alike() -> None:
     assert len(alike([row(0, "x"), row(1, "x", status="trace_failed")])) == 2
 

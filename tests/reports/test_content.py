@@ -180,8 +180,11 @@ def test_what_cases_say_with_other_numbers_is_one_line() -> None:
     snaps = [{"warnings": [f"frame {n}: gave way at {n}.5 mm", "bone touches"]} for n in range(3)]
     results = dict(zip("abc", snaps, strict=True))
     assert said_by_cases(results, "warnings") == [
-        "a, b, c: frame 0: gave way at 0.5 mm (2 more with other numbers, on the pages of the cases)",
+        "a, b, c: frame 0: gave way at 0.5 mm (numbers of a; 2 more with other numbers, on the pages of the cases)",
         "a, b, c: bone touches",
     ]
+    worse = {"warnings": ["frame 0: gave way at 0.5 mm", "frame 7: gave way at 9 mm"]}
+    (of_two,) = said_by_cases({"a": worse, "b": worse, "c": {"warnings": ()}}, "warnings")
+    assert of_two == "a, b: frame 0: gave way at 0.5 mm (1 more with other numbers, on the pages of the cases)"
     alone = {"a": {"warnings": ["frame 1: gave way", "frame 2: gave way"]}}
     assert said_by_cases(alone, "warnings") == ["frame 1: gave way", "frame 2: gave way"], "its page has them all"

@@ -28,7 +28,7 @@ from reports.figures.simulators import SimulatorFiles, _nearest, unbroken, who_i
 from reports.figures.simulators import colours as colours_of
 from reports.frames_file import FrameArrays, ScanCrop, Straightened, frame_numbers, read_frame, read_scan, write_frames
 from reports.page import draw_sections
-from reports.schema import BUDGET, ENTRIES, ERRORS, OURS, POINTS, SUMMARY, SWEEP, TIMINGS
+from reports.schema import ALL, BUDGET, ENTRIES, ERRORS, OURS, POINTS, SUMMARY, SWEEP, TIMINGS
 from reports.verdict import NEVER_NEAREST
 from tests.reports.fake_results import FakeCase, write_run
 
@@ -213,15 +213,15 @@ def test_a_table_of_forces_tells_refused_frames_from_others(tmp_path: Path) -> N
 
 
 def test_a_refused_frame_without_a_wire_has_a_cross_in_its_row(tmp_path: Path) -> None:
-    """Its row was blank, as of a frame that nobody refused; a frame beside the rows of the map has no place for one."""
+    """Its row was blank, as of a frame that nobody refused; the last one had no row at all."""
     case = _heat_case(tmp_path)
     assert case.samples is not None
     errors = pd.DataFrame({"frame": [0, 1, 2, 3], "status": ["ok", "no_wire", "ok", "no_wire"]})
     forces = case.samples.assign(contact_force_N=1.0)
     drawing = draw(CASE_FIGURES["contact_along_wire"], replace(case, samples=forces, errors=errors))
     (crosses,) = drawing.figure.axes[0].lines
-    assert list(crosses.get_ydata()) == [1]
-    assert drawing.table[drawing.table["status"] == "no_wire"]["frame"].tolist() == [1]
+    assert list(crosses.get_ydata()) == [1, 3]
+    assert drawing.table[drawing.table["status"] == "no_wire"]["frame"].tolist() == [1, 3]
 
 
 def test_long_names_leave_room_for_what_is_drawn(tmp_path: Path) -> None:
@@ -440,6 +440,9 @@ def test_marks_at_the_end_of_four_entries_are_whole(tmp_path: Path) -> None:
     tables.write(tmp_path / "entries.csv", ENTRIES, [{"clamp": "manifest", "depth": "traced"} | far])
     drawing = draw(CASE_FIGURES["budget"], _empty_case(tmp_path))
     assert drawing.figure.axes[0].get_xlim() == pytest.approx((0.0, 0.165))
+    dot, square, _ = drawing.figure.axes[0].get_lines()
+    assert square.get_fillstyle() == "none", "a dot at the same place was hidden"
+    assert square.get_markersize() - square.get_markeredgewidth() > dot.get_markersize() + 1.0
 
 
 def test_only_what_was_computed_of_a_budget_is_drawn(tmp_path: Path) -> None:
@@ -516,12 +519,25 @@ def test_projections_choose_first_middle_last_and_worst(tmp_path: Path) -> None:
     drawing, failed = (draw(CASE_FIGURES[name], case) for name in ("projections", "failed_projections"))
     titles = [axes.get_title(loc="left") for axes in drawing.figure.axes]
     assert [t for t in titles if "frame" in t] == [
-        "frame 1 (first)",
+        "frame 1 (first ok)",
         "frame 3 (worst)",
         "frame 5 (middle)",
         "frame 8 (last)",
     ]
     assert any(axes.get_title(loc="left") == "frame 0 (no_wire)" for axes in failed.figure.axes)
+
+
+def test_frames_that_failed_at_both_ends_have_rows(tmp_path: Path) -> None:
+    """The map of errors ended at the last frame that is ok, as if there were no other."""
+    out = write_run(tmp_path / "out", (FakeCase("c", frames=6, failed=(0, 5)),))
+    case = read_case(out / "cases" / "c")
+    for name in ("error_along_wire", "contact_along_wire"):
+        (rows,) = draw(CASE_FIGURES[name], case).frames
+        assert list(rows.of_frame) == [*range(6)], name
+        low, high = sorted(rows.axes.get_ylim())
+        assert (low, high) == (-0.5, 5.5), name
+    titles = [axes.get_title(loc="left") for axes in draw(CASE_FIGURES["projections"], case).figure.axes]
+    assert [title for title in titles if "frame" in title][-1].startswith("frame 4 (last ok")
 
 
 def test_failed_frames_are_marked_and_their_values_not_drawn(tmp_path: Path) -> None:
@@ -739,6 +755,8 @@ def test_a_caption_says_only_what_is_drawn_of_the_cases(cases: int, said: bool, 
     (entry,) = [entry for entry in declared("run") if entry["figure"] == "planned_within"]
     assert ("thin: each case" in caption(entry["read"], drawing.table)) == said
     assert len(drawing.figure.axes[0].get_lines()) == 1 + said * cases
+    names = [ALL, "c0", "c1"] if said else ["c0"]
+    assert [*drawing.table["case"].unique()] == names, "rows were of nobody"
 
 
 @pytest.mark.quick(1)

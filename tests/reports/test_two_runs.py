@@ -427,6 +427,20 @@ def test_another_ruler_makes_nothing_better(first: Path, second: Path, capsys: p
     assert "errors are measured otherwise in the second run (compare.skip_mm)" in said.splitlines()[-1]
 
 
+def test_other_predictors_are_no_other_ruler(first: Path, second: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Errors were called measured otherwise, and the ratio said nothing, where skill alone was against others."""
+    times(second, 0.5)
+    for out, value in ((first, True), (second, False)):
+        for path in out.glob("cases/*/result.json"):
+            result = json.loads(path.read_text(encoding="utf-8"))
+            result["config"].setdefault("compare", {})["simulated_nulls"] = {"value": value, "source": "command line"}
+            path.write_text(json.dumps(result), encoding="utf-8")
+    assert main(["diff", str(first), str(second)]) == 0
+    said = capsys.readouterr().out
+    assert "compare.simulated_nulls" in said, "it differs, and that is said"
+    assert "measured otherwise" not in said
+
+
 def test_a_run_that_ended_before_frames_are_compared_is_no_baseline(
     first: Path, second: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
