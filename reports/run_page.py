@@ -65,11 +65,7 @@ def render_index(out_dir: Path, embed: bool = False, each: Each = one_by_one) ->
         **_judged(out_dir, cases, first_that_holds(why), row, why_none, one_case(summary.to_dict("records"))),
         **_worse_cases(summary, links),
         "worst": worst_frames({n: t for n, t in files.errors.items() if n not in uncounted}, links),
-        "next": next_command(
-            [*(f["case"] for f in failures), *missing],
-            typed(out_dir) if len(infos) == 1 else (),  # of several shards' commands none is the one of the run
-            [f["status"] for f in failures],
-        ),
+        "next": _next(failures, missing, typed(out_dir) if len(infos) == 1 else ()),
         "failures": alike(failures),
         "beside_others": (out_dir / SIMULATORS.file).exists(),
         **aside,
@@ -188,6 +184,11 @@ def _judged(
     said, more = headline(row, _simulator(cases), caveats)
     shown = badge(status, status == "ok", row, caveats, hidden)
     return {"verdict": said or why_none, "more": more, "badge": shown, "warnings": caveats.warnings}
+
+
+def _next(failures: Sequence[Mapping[str, Any]], missing: Sequence[str], words: Sequence[str]) -> str:
+    """The command that comes next. words : of this run; none of several shards', of which none is that of the run."""
+    return next_command([*(f["case"] for f in failures), *missing], words, [f["status"] for f in failures])
 
 
 def _headline(cases: list[CaseFiles], missing: Sequence[str], damaged: Container[str]) -> dict[str, str]:
