@@ -127,17 +127,19 @@ def _unknown(
     """What is said of a word that a verb does not know. words : all that was typed."""
     long = [name for name in allowed if name.startswith("--")]
     hint = did_you_mean(word, long) if word.startswith("-") else "one argument too many"
-    if verb in OF_MANIFEST and not word.startswith("-") and (word.endswith(".toml") or status_of(Path(word))):
+    before = [one for one in words[: words.index(word)] if one.startswith("-")] if word in words else []
+    again = bool(before) and isinstance(allowed.get(before[-1]), argparse._AppendAction) and not word.startswith("-")
+    a_file = not word.startswith("-") and (word.endswith(".toml") or bool(status_of(Path(word))))
+    if verb in OF_MANIFEST and a_file and not again:
         own = ", each with an OUT of its own" * ("--out" in allowed)
         return _usage(f"{word}: {verb} takes one manifest; {SEVERAL}{own}")
-    before = [one for one in words[: words.index(word)] if one.startswith("-")] if word in words else []
-    if before and isinstance(allowed.get(before[-1]), argparse._AppendAction) and not word.startswith("-"):
+    if again:
         hint = f"{before[-1]} takes one value; repeat it: {before[-1]} {word}"
     return _usage(f"{word}: not an option of wireval {verb or ''}; {hint}".replace(" ;", ";"))
 
 
 OF_MANIFEST = "check", "run", "score", "calibrate"
-SEVERAL = "several are joined into one, as docs/howto/cluster.md says, or given one after the other"
+SEVERAL = "several are joined into one, as docs/howto/cluster.md says, or run one by one"
 
 
 def _usage(problem: str) -> InputError:

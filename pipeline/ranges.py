@@ -160,8 +160,11 @@ Name = Annotated[str, BeforeValidator(_visible)]
 
 
 def _on_one_line(value: Any) -> Any:
-    """A sentence, its lines joined; ValueError as for a name: what a terminal obeys is not handed on to one."""
-    return _visible(" ".join(value.split()) if isinstance(value, str) else value)
+    """A sentence, its lines joined; ValueError for what a terminal obeys, or nobody sees."""
+    joined = " ".join(value.split()) if isinstance(value, str) else ""
+    if not joined.isprintable():
+        raise ValueError(f"{joined!r:.200} has characters that are not seen; write it without them")
+    return joined if isinstance(value, str) else value
 
 
 Sentence = Annotated[str, BeforeValidator(_on_one_line)]

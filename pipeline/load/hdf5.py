@@ -7,7 +7,7 @@ The datasets of a group come in natural order, and each one's geometry is compar
 
 import re
 from dataclasses import replace
-from itertools import product
+from itertools import permutations, product
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +26,9 @@ AXES = ("z,y,x", "x,y,z")
 MOST_NAMES = 20
 ATTRIBUTES = {"coordinates": "space", "space": "space", "length_unit": "unit", "units": "unit", "unit": "unit"}
 """By which a file, a group or a dataset in it states space and unit of length."""
-_OTHER_SPACE = re.compile(r"^(?!lps)[rl][ap][si]\b|right|anterior|inferior|ijk|index|(?:vox|pix)el", re.IGNORECASE)
+_CODES = {"".join(code) for axes in product("rl", "ap", "si") for code in permutations(axes)} - {"lps"}
+_NO_LENGTH = re.compile(r"(?:vox|pix)els?(?: ind(?:ex|ices))?")
+_OTHER_WAY = re.compile(r"(?:right|left)[ _-]*anterior|right[ _-]*posterior|inferior")
 
 
 def _volumes(file: h5py.File, source: Source) -> list[h5py.Dataset]:
@@ -88,12 +90,38 @@ def inside(group: h5py.Group, name: str, source: Source) -> Any:
 
 
 def require_usual(what: object, *stating: h5py.HLObject) -> None:
-    """LoadError where the file, or something in it, states another space or unit of length than LPS mm."""
+    """LoadError where the file, or something in it, states another space or unit of length than LPS mm.
+
+    What states neither, as the unit of greys or netCDF's names of coordinates, is passed over.
+    """
     for held, (name, of) in product(stating, ATTRIBUTES.items()):
-        said = text_of(held.attrs.get(name, ""))
-        if _OTHER_SPACE.search(said) or (of == "unit" and UNITS_MM.get(said.lower().strip("[]() "), 1.0) != 1.0):
+        said = _in_words(held.attrs.get(name, ""))
+        if (_is_other_unit if of == "unit" else _is_other_space)(said.lower()):
             where = f"{held.name}: attribute {name} is {said!r}"
             raise unusable(what, f"{where}; allowed in HDF5: LPS mm; convert the numbers, and the attribute")
+
+
+def _in_words(attribute: Any) -> str:
+    """An attribute's text; of an array with one value for each axis, ``cm`` three times or R, A and S, that of all."""
+    each = [text_of(value) for value in np.ravel(attribute)]
+    return ("" if all(len(one) == 1 for one in each) else " ").join(dict.fromkeys(each))
+
+
+def _is_other_unit(said: str) -> bool:
+    name = said.strip("[]() ")
+    return UNITS_MM.get(name, 1.0) != 1.0 or bool(_NO_LENGTH.fullmatch(name))
+
+
+def _is_other_space(said: str) -> bool:
+    words = re.findall("[a-z]+", said)
+    grid = words in (["index"], ["indices"]) or {"ijk", "voxel", "voxels", "pixel", "pixels"} & {*words}
+    other = grid or _CODES & {*words} or _OTHER_WAY.search(said)
+    return bool(other) and words[:1] != ["lps"]
+
+
+def _with_parents(data: h5py.Dataset) -> list[h5py.HLObject]:
+    """A dataset, the groups that it lies in, and the file's root."""
+    return [data, *(_with_parents(data.parent) if data.name != "/" else [])]
 
 
 def _attribute(source: Source, data: h5py.Dataset, name: str, default: Any, allowed: str) -> Any:
@@ -139,7 +167,7 @@ def read_header(source: Source, config: LoadConfig) -> Header:
         raise unusable(source, f"{kind}. Check that the file is complete: copy it again.") from None
     with file:
         volumes = _volumes(file, source)
-        require_usual(source, file, volumes[0].parent, *volumes)
+        require_usual(source, *volumes[1:], *_with_parents(volumes[0]))
         headers = [_header(source, data, config) for data in volumes]
         for header, data in zip(headers, volumes, strict=True):
             if len(headers) > 1:

@@ -62,7 +62,8 @@ def _axes(path: Path, fields: dict[str, str]) -> Axes:
     kinds = fields.get("kinds", "").lower().split() or ["domain"] * count
     without = [n for n, vector in enumerate(vectors) if vector is None]
     leading = count == 4 and (without[0] == 0 if without else kinds[0] not in DOMAINS)
-    if count == 4 and not leading and (without not in ([], [3]) or kinds[-1] not in (*DOMAINS, "list")):
+    volumes = without in ([], [3]) and (sizes[-1] == 1 or kinds[-1] in (*DOMAINS, "list"))
+    if count == 4 and not leading and not volumes:
         got = f"space directions {fields.get('space directions', '')[:80]!r} and kinds {fields.get('kinds', '')[:80]!r}"
         raise unusable(path, f"{got}; allowed: three axes in space, then one that counts volumes; save it again")
     shape, items = axes_of(path, sizes[1:] if leading else sizes)
@@ -96,10 +97,8 @@ def head_of(path: Path) -> Head:
 
 
 ALIAS = {"datafile": "data file", "lineskip": "line skip", "byteskip": "byte skip"}
-FIELDS = (
-    "type", "dimension", "sizes", "endian", "encoding", "space", "space dimension", "space directions", "space origin",
-    "space units", "spacings", "units", "kinds", "byte skip", "line skip", *ALIAS,
-)  # fmt: skip
+PLACING = "endian", "space", "space directions", "space origin", "space units", "spacings"
+"""Fields that may be missing, so that a pair of the same name passed for one."""
 DOMAINS = ("domain", "space", "time", "???", "none")
 
 
@@ -117,22 +116,24 @@ def _fields(path: Path) -> tuple[dict[str, str], int]:
     for n, line in enumerate(lines[1:], 2):
         name, colon, value = line.partition(":")
         if colon and not line.startswith("#"):
-            _require_a_field(path, name, value)
-            key = name if value.startswith("=") else ALIAS.get(name.strip().lower(), name.strip().lower())
+            key = f"{name}:=" if value.startswith("=") else ALIAS.get(name.strip().lower(), name.strip().lower())
             value = value.removeprefix("=").strip()
             if fields.setdefault(key, value) != value:
                 raise said_twice(path, f"{key}: {fields[key][:40]}", f"{key}: {value[:40]}")
             if key == "data file" and value.upper().split()[:1] == ["LIST"]:  # the header's last field: names follow
                 fields[key] = "\n".join((value, *lines[n:]))
                 break
+    _require_fields(path, fields)
     return fields, end
 
 
-def _require_a_field(path: Path, name: str, value: str) -> None:
-    """LoadError for a pair key:=value, which says nothing of the voxels, that has the name of a field, which does."""
-    if value.startswith("=") and name.strip().lower() in FIELDS:
-        what = f"{name.strip()}:={value[1:41]} is a key/value pair, which readers pass over"
-        raise unusable(path, f"{what}; allowed: {name.strip()}: {value[1:].strip()[:40]}; correct the header")
+def _require_fields(path: Path, fields: dict[str, str]) -> None:
+    """LoadError for a key/value pair (key:=value, which readers pass over) by the name of a field that is missing."""
+    for pair, value in fields.items():
+        name = pair.removesuffix(":=").strip().lower()
+        if pair.endswith(":=") and name in PLACING and name not in fields:
+            what = f"{pair}{value[:40]} is a key/value pair, which readers pass over"
+            raise unusable(path, f"{what}; allowed: {name}: {value[:40]}; correct the header")
 
 
 def _byte_skip(path: Path, fields: dict[str, str], packing: str) -> int:
@@ -208,7 +209,8 @@ def _geometry(path: Path, fields: dict[str, str], vectors: list[Any], leading: i
         words = fields.get("spacings", "1 1 1" if not leading else "1 1 1 1").split()[leading:][:3]
         columns = np.diag(numbers(path, {"spacings": " ".join(words)}, "spacings", 3))
     stated = fields.get("space units", "") or fields.get("units", "")
-    units = re.findall(r'"([^"]*)"', stated) or stated.split()  # unquoted ones were passed over: cm as mm
+    # unquoted ones were passed over: cm as mm
+    units = re.findall(r'"([^"]*)"', stated) or [unit for unit in stated.split() if unit not in ("???", "none")]
     named = [unit for unit in units if unit.strip()][:3] or ["mm"]
     if len(set(named)) > 1:
         raise unusable(path, f"units {named} differ between the axes; allowed: one unit for all; convert the file")
@@ -230,9 +232,10 @@ def _segments(fields: dict[str, str]) -> Names:
     """Every segment of 3D Slicer by its name."""
     found: Names = {}
     for key, name in fields.items():
-        match = re.fullmatch(r"(Segment\d+_)Name", key)
+        match = re.fullmatch(r"(Segment\d+_)Name:=", key)
         if match:
-            layer, value = (fields.get(match[1] + part, one) for part, one in (("Layer", "0"), ("LabelValue", "1")))
+            layer = fields.get(f"{match[1]}Layer:=", "0")
+            value = fields.get(f"{match[1]}LabelValue:=", "1")
             if layer.isdecimal() and value.isdecimal():
                 found.setdefault(name, []).append((int(layer), int(value)))
     return found

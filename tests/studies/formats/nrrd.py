@@ -22,8 +22,9 @@ def nrrd_variants() -> Iterator[Variant]:
     yield Variant("nrrd, in cm", metres, spacing=10 * SPACING, origin=10 * ORIGIN)
     unquoted = changed(plain, ("endian", "space units: cm cm cm\nendian"))
     yield Variant("nrrd, in cm without quotes", unquoted, spacing=10 * SPACING, origin=10 * ORIGIN)
-    for pair in ("space units:=cm cm cm", "Space:=right-anterior-superior", "endian:=big"):
-        yield Variant(f"nrrd, the pair {pair}", changed(plain, ("endian", f"{pair}\nendian")), "!key/value pair")
+    yield Variant("nrrd, a pair for a field", changed(plain, ("endian", "space units:=cm\nendian")), "!key/value pair")
+    for pair in ("Space:=right-anterior-superior", "endian:=big", "Units:=HU", "type:=CT", "space units: ??? ??? ???"):
+        yield Variant(f"nrrd, with {pair}", changed(plain, ("endian", f"{pair}\nendian")))
     yield Variant(
         "nrrd, a space of no body", changed(plain, ("left-posterior-superior", "3D-left-handed")), "left-handed"
     )
