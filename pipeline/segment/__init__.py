@@ -15,7 +15,7 @@ from pipeline.arrays.grids import in_memory_order, reorder
 from pipeline.model import Lumen, Volume
 from pipeline.segment import bone, leaked, noise, thin, uneven, valley
 from pipeline.segment.config import SegmentConfig
-from pipeline.segment.contact import warning
+from pipeline.segment.contact import Contact, contacts, warning
 from pipeline.segment.cut_off import cut_off
 from pipeline.segment.embedded import Block, surrounding
 from pipeline.segment.ends import ends
@@ -25,8 +25,8 @@ from pipeline.segment.layered import layer_around, surrounded, with_layer_alone
 from pipeline.segment.levels import GreyLevels, Region, Vessel, brighter, scanner_blur
 from pipeline.segment.necks import add_necks, closed_necks
 from pipeline.segment.on_wire import beside, swallowed
-from pipeline.segment.sheets import open_ones
-from pipeline.segment.surface import SignedDistance, Site, prepare, wall_of
+from pipeline.segment.sheets import open_ones, sheets
+from pipeline.segment.surface import NONE, SignedDistance, Site, prepare, wall_of
 from pipeline.segment.uneven import evened
 from pipeline.status import StageError
 from solver.grid import Grid
@@ -160,6 +160,14 @@ def _of_the_vessel(scan: Grid, found: _Found) -> tuple[str, ...]:
     return layer + tissue + block + sides + cut_off(vessel) + flat_side(vessel.distance)
 
 
+def _touching(vessel: Vessel, *, even: bool) -> tuple[tuple[Contact, ...], tuple[str, ...]]:
+    """Vessels that it is open to, and sentences on bone.     even : whether it is filled alike across."""
+    seen, sheet, bright = side_by_side(
+        lambda: contacts(vessel.distance), lambda: sheets(vessel) if even else NONE, lambda: bone.touching(vessel)
+    )
+    return open_ones(vessel, seen, sheet), bright
+
+
 def _beside_it(found: _Found) -> tuple[str, ...]:
     """Sentences on vessels that pass by, and on branches that are left out."""
     scan, region = found.site.volume, found.region
@@ -182,14 +190,16 @@ def segment(
     scan, axes = in_memory_order(volume)
     found = _beside_wire(scan, seeds_mm, config, wire_radius_mm)
     region, wall, blur, vessel, begun = found.region, found.wall, found.blur, found.vessel, found.as_begun
-    touching, bright = side_by_side(lambda: open_ones(vessel, wall.sides is None), lambda: bone.touching(vessel))
+    touching, bright = _touching(vessel, even=wall.sides is None)
     if len(region.thin):
         branches = thin.balls(begun, region.thin, blur)
         thin.add_balls(wall.values, scan.spacing_mm, branches, config.outer_mm)
     other = brighter(wall.levels, wire_radius_mm is not None) + bright + uneven.warning(found.least)
     said = noise.warning(config.scale, region.levels.noise_after(region.taps), region.levels.contrast)
-    said += _of_the_vessel(scan, found) + warning(touching) + _beside_it(found)
-    said += other or bone.two_greys(vessel, wall.blur_mm)
+    around, greys = side_by_side(
+        lambda: _of_the_vessel(scan, found), lambda: other or bone.two_greys(vessel, wall.blur_mm)
+    )
+    said += around + warning(touching) + _beside_it(found) + greys
     said += add_necks(region.necks, begun, wall.values, blur)
     said += add_necks(closed_necks(begun, config.least_voxels), begun, wall.values, blur)
     said += ends(vessel, wall.wall)

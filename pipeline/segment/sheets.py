@@ -44,14 +44,13 @@ NEXT_TO = 0.1
 """Depth in voxels that is left within a sheet, so that what lies on its two sides still meets there."""
 
 
-def open_ones(vessel: Vessel, even: bool) -> tuple[Contact, ...]:
+def open_ones(vessel: Vessel, seen: tuple[Contact, ...], sheet: Index) -> tuple[Contact, ...]:
     """Places where vessels that do not branch from each other are open to each other, by their shape or by a sheet.
 
-    even : whether it is filled alike across; a wire in a fainter layer leaves a sheet between it and the brighter one.
+    seen : those by its shape.  sheet : voxels of sheets, none where it is not filled alike across: a wire in a fainter
+    layer leaves a sheet between it and the brighter one.
     """
-    seen = contacts(vessel.distance)
-    sheet = sheets(vessel) if even else None
-    if sheet is None or not len(sheet):
+    if not len(sheet):
         return seen
     parted = contacts(_parted(vessel.distance, sheet), LEAST_AREA)
     # an opening that both find is larger by the one or by the other

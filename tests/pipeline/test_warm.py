@@ -14,11 +14,11 @@ SCRIPT = """
 import sys
 from numba.core.dispatcher import Dispatcher
 from pipeline.cli import main
-from pipeline.trace.warm import warm_up
+from pipeline.run.warm import warm_up
 
 
 def loaded():
-    modules = [m for name, m in [*sys.modules.items()] if name.startswith("pipeline.trace")]
+    modules = [m for name, m in [*sys.modules.items()] if name.startswith(("pipeline.segment", "pipeline.trace"))]
     kernels = {id(k): k for m in modules for k in vars(m).values() if isinstance(k, Dispatcher)}
     return sum(len(k.signatures) for k in kernels.values())
 
@@ -56,17 +56,17 @@ def test_a_tiny_wire_loads_what_frames_need(folder, reference):
 
 
 @pytest.mark.quick(1)
-@pytest.mark.parametrize(("cores", "until", "asked"), [(2, "trace", 1), (2, "segment", 0), (1, "trace", 0)])
-def test_code_is_loaded_beside_segmentation_where_there_are_cores(folder, tmp_path, monkeypatch, cores, until, asked):
+@pytest.mark.parametrize(("cores", "until"), [(2, "trace"), (2, "segment"), (1, "trace")])
+def test_code_is_loaded_beside_segmentation_where_there_are_cores(folder, tmp_path, monkeypatch, cores, until):
     """Of the scan's own grey values, and with a reference as it has one; what goes wrong there costs nothing."""
     seen = []
 
-    def fails(kind, *, reference):
-        seen.append((np.dtype(kind).name, reference))
+    def fails(kind, *, reference, traced):
+        seen.append((np.dtype(kind).name, reference, traced))
         raise ValueError("no matter")
 
     monkeypatch.setattr(stage, "warm_up", fails)
     manifest, out = folder / "study" / "manifest.toml", tmp_path / "out"
     assert main(["run", str(manifest), "-o", str(out), "--until", until, "--no-cache", "-q", "-j", str(cores)]) == 0
-    assert seen == asked * [("int16", True)]
-    assert ("loaded later" in (out / "cases" / "bend" / "log.txt").read_text(encoding="utf-8")) == bool(asked)
+    assert seen == ([("int16", True, until == "trace")] if cores > 1 else [])
+    assert ("loaded later" in (out / "cases" / "bend" / "log.txt").read_text(encoding="utf-8")) == (cores > 1)

@@ -36,7 +36,10 @@ def study(folder: Path, cases: int) -> Path:
     return folder / "manifest.toml"
 
 
-IMPORTED = "pipeline.commands.run", "pipeline.commands.synth", workers.PRELOADED
+IMPORTED = (
+    "pipeline.commands.run", "pipeline.commands.synth", workers.PRELOADED,
+    "pipeline.run.aggregate", "pipeline.run.last_words", "pipeline.run.launch",
+)  # fmt: skip
 """What a command imports before it begins."""
 
 

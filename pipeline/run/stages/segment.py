@@ -14,6 +14,7 @@ from pipeline.load.lumens import LOOK_AT, meant_within_mm, read_lumen
 from pipeline.model import Array, Lumen, Volume
 from pipeline.run.projections import slabs
 from pipeline.run.stages.known import Context, Known
+from pipeline.run.warm import warm_up
 from pipeline.segment import segment
 from pipeline.segment.astray import astray
 from pipeline.segment.given import given_lumen
@@ -23,7 +24,6 @@ from pipeline.segment.opened import outside_mm
 from pipeline.segment.pieces import in_pieces
 from pipeline.segment.shown import LumenDoubt, beside_the_wall
 from pipeline.status import StageError
-from pipeline.trace.warm import warm_up
 from reports.frames_file import ScanCrop
 
 
@@ -63,8 +63,7 @@ def _loading(run: Context, reference: bool) -> Callable[..., Lumen]:
 
     def load(scan: Volume) -> None:
         try:
-            if run.goes_to("trace"):
-                warm_up(scan.values.dtype, reference=reference)
+            warm_up(scan.values.dtype, reference=reference, traced=run.goes_to("trace"))
             if run.goes_to("simulate"):
                 run.kernels()
         except Exception as error:  # it only saves time: a stage that needs the code meets the same error, if it does
