@@ -9,10 +9,10 @@ from reports._content import flatten, settings
 from reports.alike import alike
 from reports.case_files import GOOD, CaseFiles, counted, counted_scans, read_case, runs_in
 from reports.doubts import Caveats, copied_from_traces, weightiest_first
-from reports.figures import declared
 from reports.listing import listed_files, listed_view
 from reports.page import Each, begun_first, longest, one_by_one, section, write_page
 from reports.schema import ERRORS, FAILURES
+from reports.sections import declared
 from reports.unscored import OF_CALIBRATION
 from reports.verdict import badge, headline
 from reports.viewer import viewer_data

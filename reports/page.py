@@ -12,8 +12,9 @@ from markupsafe import Markup
 from reports import _content, colours
 from reports.alike import of_what
 from reports.atomic import remove_files, write_text
-from reports.figures import declared, figures_of
+from reports.figures import figures_of
 from reports.figures._drawing import DOTS_PER_INCH, save
+from reports.sections import declared
 
 R = TypeVar("R")
 LONGEST = "projections", "contact_along_wire", "run_time"

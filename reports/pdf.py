@@ -22,13 +22,14 @@ from reports.case_files import (
     results_in,
 )
 from reports.doubts import assumed, caveats_of, said_by_cases
-from reports.figures import declared, figures_of
+from reports.figures import figures_of
 from reports.gates import gates_in
 from reports.origin import why_not_pooled
 from reports.pdf_page import RIGHT, WIDE, Figured, Page
 from reports.records import read_json
 from reports.run_page import frames_not_run, readable_cases, run_files
 from reports.schema import FAILURES, OVERALL_FILE, SUMMARY
+from reports.sections import declared
 from reports.tables import first_row, in_texts, read_if_there
 from reports.unscored import unscored
 from reports.verdict import WORSE, verdict

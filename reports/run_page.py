@@ -28,12 +28,13 @@ from reports.case_files import (
 )
 from reports.case_page import case_failures, scored_or_ok, version_of
 from reports.doubts import assumed, caveats_of
-from reports.figures import RunFiles, declared
+from reports.figures import RunFiles
 from reports.gates import gates_in
 from reports.origin import why_not_pooled
 from reports.page import Each, draw_sections, one_by_one, write_page
 from reports.records import read_json, run_records
 from reports.schema import FAILURES, OVERALL_FILE, SIMULATORS, SUMMARY, SWEEP
+from reports.sections import declared
 from reports.sweep import not_run_sentence as not_swept_sentence
 from reports.sweep import silent_points
 from reports.tables import first_row, in_texts, read_if_there

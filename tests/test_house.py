@@ -104,9 +104,11 @@ def test_a_stated_bound_is_the_bound() -> None:
     assert not wrong, "say rtol, too"
 
 
-def test_help_imports_nothing_heavy() -> None:
-    """`wireval --help` must be instant: the command line imports a command's modules inside the command."""
-    code = "import sys, pipeline.cli; pipeline.cli.parsers(); print(*sys.modules)"
+@pytest.mark.parametrize("words", [["--help"], ["--version"]])
+def test_help_and_version_import_nothing_heavy(words: list[str]) -> None:
+    """They must be instant: the command line imports a command's modules inside the command."""
+    last = "atexit.register(lambda: print(*sys.modules))"
+    code = f"import atexit, sys; {last}; from pipeline.cli import main; main({words})"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, encoding="utf-8", check=True, cwd=ROOT)
     assert not {"numpy", "SimpleITK", "numba", "matplotlib", "pandas"} & set(done.stdout.split())
 

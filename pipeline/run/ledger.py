@@ -18,9 +18,9 @@ from typing import Literal
 from pydantic import TypeAdapter
 
 from reports.atomic import write_bytes, writing
-from reports.figures import declared
 from reports.records import ALWAYS, read_json
 from reports.schema import BUDGET, ENTRIES, ERRORS, POINTS, TIMINGS
+from reports.sections import declared
 
 FILE = "ledger.json"
 RESULT, FRAMES, PROVENANCE = "result.json", "frames.h5", "provenance.json"

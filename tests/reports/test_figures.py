@@ -20,7 +20,7 @@ from reports import colours, tables
 from reports._content import caption
 from reports.case_files import CaseFiles, read_case
 from reports.colours import ERROR_SCALE_MM, TRACED
-from reports.figures import RunFiles, _drawing, _planes, declared, figures_of
+from reports.figures import RunFiles, _drawing, _planes, figures_of
 from reports.figures._drawing import LEAST_MM, Drawing, FrameAxis, drawn_names, positive_axis
 from reports.figures._style import STAGE_COLOURS, lines, predictors
 from reports.figures.along_wire import _CLIP_PERCENTILE
@@ -29,6 +29,7 @@ from reports.figures.simulators import colours as colours_of
 from reports.frames_file import FrameArrays, ScanCrop, Straightened, frame_numbers, read_frame, read_scan, write_frames
 from reports.page import draw_sections
 from reports.schema import ALL, BUDGET, ENTRIES, ERRORS, OURS, POINTS, SUMMARY, SWEEP, TIMINGS
+from reports.sections import declared
 from reports.verdict import NEVER_NEAREST
 from tests.reports.fake_results import FakeCase, write_run
 

@@ -17,9 +17,10 @@ import pytest
 from reports import figures, tables
 from reports.case_files import find_cases, read_case
 from reports.case_page import render_case
-from reports.figures import Drawing, declared, figures_of
+from reports.figures import Drawing, figures_of
 from reports.run_page import _made, render_index
 from reports.schema import ERRORS, FAILURES, SUMMARY
+from reports.sections import declared
 from tests.reports.fake_results import EVERY_KIND, FakeCase, write_run
 from tests.unseen import scarce as scarce
 from tests.unseen import undrawn
