@@ -1,5 +1,6 @@
 """Wires that users bring (.csv, .vtp, .mrk.json), and the true ones of a synthetic study (truth.json). Out: LPS mm."""
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -106,6 +107,8 @@ def points_in_table(path: Path, rows: list[list[str]]) -> NDArray[np.float64]:
         raise unusable(path, f"has {len(head)} columns without names; expected x, y, z; name them above the table")
     taken, below = (range(3), rows) if columns is None else (columns, rows[1:])
     allowed = "columns x_mm, y_mm, z_mm of numbers"
+    if columns is not None:
+        _require_one_wire(path, head, below)
     short = next((row for row in below if len(row) <= max(taken)), None)
     if short is not None:
         raise refused(path, f"a row of {len(short)} values, {', '.join(short)}", allowed, "write three in every row")
@@ -113,6 +116,19 @@ def points_in_table(path: Path, rows: list[list[str]]) -> NDArray[np.float64]:
         return np.array([[to_number(row[c]) for c in taken] for row in below]).reshape(-1, 3)
     except ValueError as error:
         raise refused(path, f"{error} (header {head})", allowed, "name the columns") from error
+
+
+_GROUPS = re.compile(r"(?:frame|curve|wire|line|case|step|id)(?:_?(?:id|index|number|no|nr))?")
+"""Names of columns, in small letters, that tell several wires of one table apart."""
+
+
+def _require_one_wire(path: Path, head: list[str], below: list[list[str]]) -> None:
+    """LoadError for a table of several wires: its points made one, which went back to the entry with every frame."""
+    for column in (c for c, name in enumerate(head) if _GROUPS.fullmatch(name)):
+        groups = dict.fromkeys(row[column].strip() for row in below if len(row) > column)
+        if 1 < len(groups) < len(below):
+            got = f"{len(groups)} wires, by its column {head[column]} ({', '.join([*groups][:3])}{', ...' * (len(groups) > 3)})"
+            raise refused(path, got, "the points of one", "write a file for each, named in the order of the frames")
 
 
 def _without_points(head: list[str]) -> str:

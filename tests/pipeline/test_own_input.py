@@ -378,6 +378,9 @@ def test_what_speaks_of_ras_and_does_not_state_it_is_refused(tmp_path: Path, lin
     [
         ("# units are metres", "a line speaks of a unit"),
         ("# in cm", "a line speaks of a unit"),
+        ("# inches", "a line speaks of a unit"),
+        ("# points of the wire [cm]", "a line speaks of a unit"),
+        ("# the wire (phantom m)", ""),
         ("# values are in mm", ""),
         ("# made in mania", ""),
         ("# voxel indices", "a line that speaks of voxels"),
@@ -403,6 +406,22 @@ def test_a_table_without_units_that_speaks_of_some_is_refused(tmp_path: Path, li
         read_curve(tmp_path / "a.csv")
     (tmp_path / "b.csv").write_text(f"{line}\nx_mm,y_mm,z_mm\n1,2,3\n4,5,6\n", encoding="utf-8")
     assert len(read_curve(tmp_path / "b.csv").points_mm) == 2
+
+
+@pytest.mark.parametrize("name", ["frame", "wire_id", "Frame_Index"])
+def test_a_table_of_several_wires_is_refused(tmp_path: Path, name: str) -> None:
+    """Its points were taken for one wire, which went back to the entry with every frame."""
+    rows = [(frame, x) for frame in (3, 4) for x in range(3)]
+    (tmp_path / "a.csv").write_text(f"{name},x,y,z\n" + "".join(f"{f},{x},0,0\n" for f, x in rows), encoding="utf-8")
+    with pytest.raises(
+        LoadError, match=rf"got 2 wires, by its column {name.lower()} \(3, 4, ...\); expected the points"
+    ):
+        read_curve(tmp_path / "a.csv")
+    # one frame, and numbers of points
+    for each in ([7] * 6, range(6)):
+        text = "".join(f"{f},{x},0,0\n" for f, x in zip(each, range(6), strict=True))
+        (tmp_path / "b.csv").write_text(f"{name},x,y,z\n{text}", encoding="utf-8")
+        assert len(read_curve(tmp_path / "b.csv").points_mm) == 6
 
 
 @pytest.mark.parametrize(
