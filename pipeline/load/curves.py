@@ -127,7 +127,8 @@ def _require_one_wire(path: Path, head: list[str], below: list[list[str]]) -> No
     for column in (c for c, name in enumerate(head) if _GROUPS.fullmatch(name)):
         groups = dict.fromkeys(row[column].strip() for row in below if len(row) > column)
         if 1 < len(groups) < len(below):
-            got = f"{len(groups)} wires, by its column {head[column]} ({', '.join([*groups][:3])}{', ...' * (len(groups) > 3)})"
+            named = ", ".join([*groups][:3]) + ", ..." * (len(groups) > 3)
+            got = f"{len(groups)} wires, by its column {head[column]} ({named})"
             raise refused(path, got, "the points of one", "write a file for each, named in the order of the frames")
 
 
