@@ -66,9 +66,9 @@ TOO_LONG = (
             "run STUDY STUDY/manifest.toml -o y",
             "manifest.toml: run takes one manifest; several are joined into one, as",
         ),
-        ("run STUDY STUDY -o y", "or given one after the other, each with an OUT of its own"),
+        ("run STUDY STUDY -o y", "or run one by one, each with an OUT of its own"),
         ("run a.toml b.toml -o y", "b.toml: run takes one manifest"),
-        ("check STUDY STUDY/manifest.toml", "or given one after the other"),
+        ("check STUDY STUDY/manifest.toml", "or run one by one"),
         (
             "run m.toml -o out --only a b c",
             "b: not an option of wireval run; --only takes one value; repeat it: --only b",
