@@ -94,8 +94,8 @@ def _profile(off: NDArray[Any], grey: NDArray[Any]) -> tuple[Array, Array, Array
     """Middles and means of classes of distances, EVERY wide, and the median greys there, of LEAST voxels each."""
     bins = np.rint(off / EVERY).astype(np.int16)
     steps, count = np.unique(bins, return_counts=True)
-    classes = np.split(np.argsort(bins, kind="stable"), np.cumsum(count)[:-1])  # once through all, not once a class
-    classes = [own for own in classes if len(own) >= LEAST]
+    every = np.split(np.argsort(bins, kind="stable"), np.cumsum(count)[:-1])  # once through all, not once a class
+    classes = [own for own in every if len(own) >= LEAST]
     steps = steps[count >= LEAST]
     means, greys = (np.array([f(a[own]) for own in classes], float) for f, a in ((np.mean, off), (np.median, grey)))
     return np.asarray(EVERY * steps, float), means, greys

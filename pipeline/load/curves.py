@@ -107,8 +107,7 @@ def points_in_table(path: Path, rows: list[list[str]]) -> NDArray[np.float64]:
         raise unusable(path, f"has {len(head)} columns without names; expected x, y, z; name them above the table")
     taken, below = (range(3), rows) if columns is None else (columns, rows[1:])
     allowed = "columns x_mm, y_mm, z_mm of numbers"
-    if columns is not None:
-        _require_one_wire(path, head, below)
+    _require_one_wire(path, head, below)
     short = next((row for row in below if len(row) <= max(taken)), None)
     if short is not None:
         raise refused(path, f"a row of {len(short)} values, {', '.join(short)}", allowed, "write three in every row")

@@ -28,7 +28,7 @@ _SPEAKS = {
         "voxels": r"in[ \t]+(?:vox|pix)els(?![a-z])|(?:vox|pix)els?[ _-]*(?:ind|coord|unit)|ijk(?![a-z])"
         r"|(?<!smoothed in )(?<!filtered in )(?:vox|pix)els?[ _-]*space",
         "a unit": rf"(?:in[ \t]+m|(?:in|is|are)[ \t]+(?:{_OTHER_UNITS})){_ENDS}"
-        rf"|(?<=[\[(])(?:m|in|{_OTHER_UNITS})(?=[\])])|(?:(?<=^#)|(?<=^# ))(?:m|{_OTHER_UNITS})\s*$",
+        rf"|(?<=[\[(])(?:m|in|{_OTHER_UNITS})(?=[\])])|^\s*#+\s*(?:m|{_OTHER_UNITS})\s*$",
     }.items()
 }
 """What a line may speak of without stating it. "is m1" and "is m. cerebri media" name arteries."""

@@ -14,7 +14,7 @@ VESSEL, WIRE = 30.0, 80.0
 """Grey values above tissue: a signed byte holds both."""
 
 
-def warm_up(kind: DTypeLike, *, reference: bool, traced: bool = True) -> None:
+def warm_up(kind: DTypeLike, *, reference: bool, traced: bool) -> None:
     """Segment a straight vessel and trace a straight wire in it, with or without a scan that has no wire in it.
 
     kind : of grey values; each has machine code of its own. Kernels for doubtful scans alone are not met so.

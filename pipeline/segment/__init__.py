@@ -196,10 +196,8 @@ def segment(
         thin.add_balls(wall.values, scan.spacing_mm, branches, config.outer_mm)
     other = brighter(wall.levels, wire_radius_mm is not None) + bright + uneven.warning(found.least)
     said = noise.warning(config.scale, region.levels.noise_after(region.taps), region.levels.contrast)
-    around, greys = side_by_side(
-        lambda: _of_the_vessel(scan, found), lambda: other or bone.two_greys(vessel, wall.blur_mm)
-    )
-    said += around + warning(touching) + _beside_it(found) + greys
+    said += _of_the_vessel(scan, found) + warning(touching) + _beside_it(found)
+    said += other or bone.two_greys(vessel, wall.blur_mm)
     said += add_necks(region.necks, begun, wall.values, blur)
     said += add_necks(closed_necks(begun, config.least_voxels), begun, wall.values, blur)
     said += ends(vessel, wall.wall)

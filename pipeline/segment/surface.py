@@ -4,7 +4,6 @@ Where the vessel is filled unevenly across, or tissue differs around it, the wal
 """
 
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -108,18 +107,13 @@ def prepare(volume: Grid, order: Index, taps: NDArray[np.float32], margin_mm: fl
     return Site(volume, taps, corner, state, np.flatnonzero(state))
 
 
-def _smoothed(site: Site, lattice: NDArray[np.float32], voxels: Index) -> None:
-    """Smoothed grey at the voxels (flat), and around them, into the lattice."""
-    smooth_lattice(site.volume.values, site.corner, site.taps, site.state, voxels, lattice)
-
-
 def _half_level_wall(site: Site, level: float, inside: NDArray[np.uint8]) -> tuple[Index, Wall]:
     """The voxels (flat) next to the surface where smoothed grey is ``level``, and the wall there; marks ``inside``."""
     lattice = sparse_zeros(site.state.shape, np.float32)
+    values, spacing = site.volume.values, site.volume.spacing_mm
     # where two parts meet, both smooth the tile, alike
-    in_parts(partial(_smoothed, site, lattice), site.near)
+    in_parts(lambda part: smooth_lattice(values, site.corner, site.taps, site.state, part, lattice), site.near)
     voxels = surface_voxels(site.state, lattice, level, DEEP, site.near, inside)
-    spacing = site.volume.spacing_mm
     parts = in_parts(lambda part: feet(lattice, level, spacing, part, inside), voxels)
     return voxels, Wall(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
 

@@ -379,6 +379,7 @@ def test_what_speaks_of_ras_and_does_not_state_it_is_refused(tmp_path: Path, lin
         ("# units are metres", "a line speaks of a unit"),
         ("# in cm", "a line speaks of a unit"),
         ("# inches", "a line speaks of a unit"),
+        ("#  m ", "a line speaks of a unit"),
         ("# points of the wire [cm]", "a line speaks of a unit"),
         ("# the wire (phantom m)", ""),
         ("# values are in mm", ""),

@@ -24,7 +24,7 @@ def loaded():
 
 
 reference, study, out = sys.argv[1:]
-warm_up("int16", reference=reference == "True")
+warm_up("int16", reference=reference == "True", traced=True)
 before = loaded()
 assert main(["run", study, "-o", out, "--until", "trace", "--no-cache", "-q"]) == 0
 print(before, loaded())

@@ -55,7 +55,7 @@ def segment_vessel(run: Context, known: Known) -> Known:
 
 
 def _loading(run: Context, reference: bool) -> Callable[..., Lumen]:
-    """``segment``, which loads the machine code of the stages to come meanwhile: it follows the vessel on one core.
+    """``segment``, which loads its machine code and that of later stages beside it: it follows the vessel on one core.
 
     Helpers, which are forked later, then need not load it, each for itself: they do where the lumen is given or stored.
     reference : whether there is one.
